@@ -1,0 +1,111 @@
+"""The one home of pyopencl: device, build, launch. Kernels are written once and run on CPU (PoCL) and GPU alike.
+
+What it promises: the same source, defines and inputs give the same bits on one device, at any number of
+threads. So kernels gather and never scatter, use no float atomics, and are built without fast-math.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+class OpenCLUnavailable(RuntimeError):
+    """No OpenCL platform offers a device; the message says what to install."""
+
+
+MENDING = "install Debian's pocl-opencl-icd (apt-get install pocl-opencl-icd)"
+
+
+@functools.cache
+def _queue() -> Any:
+    """The command queue of the chosen device: the first GPU, else the first CPU (newest PoCL first)."""
+    try:
+        import pyopencl as cl
+
+        platforms = cl.get_platforms()
+    except ImportError as error:
+        raise OpenCLUnavailable(f"pyopencl cannot be loaded ({error}); run make setup") from error
+    except cl.Error as error:
+        raise OpenCLUnavailable(f"no OpenCL platform ({error}); {MENDING}") from error
+    devices = [d for p in sorted(platforms, key=lambda p: p.version, reverse=True) for d in p.get_devices()]
+    if not devices:
+        raise OpenCLUnavailable(f"no OpenCL device; {MENDING}")
+    wanted = os.environ.get("FLOWLOOM_DEVICE", "")
+    if wanted:
+        named = [d for d in devices if wanted.lower() in f"{d.platform.name} {d.name}".lower()]
+        if not named:
+            names = ", ".join(f"{d.platform.name}: {d.name}" for d in devices)
+            raise OpenCLUnavailable(f"FLOWLOOM_DEVICE={wanted!r} matches none of: {names}")
+        devices = named
+    devices.sort(key=lambda d: not d.type & cl.device_type.GPU)
+    return cl.CommandQueue(cl.Context(devices[:1]))
+
+
+def description() -> str:
+    """One line: the device, its driver and its platform, as a manifest records it."""
+    device = _queue().device
+    return f"{device.name} ({device.platform.name} {device.platform.version}, driver {device.driver_version})"
+
+
+class Program:
+    """One built source file; its kernels are attributes: `program.name(global_size, local_size, *args)`.
+
+    Sizes are in x, y, z order as OpenCL counts them. Arguments are device arrays (`to_device`, `empty`),
+    or NumPy scalars of the kernel's exact type.
+    """
+
+    def __init__(self, source: Path, defines: dict[str, Any]):
+        import pyopencl as cl
+
+        options = [f"-D{name}={value}" for name, value in sorted(defines.items())]
+        options += ["-I", str(Path(__file__).parent), "-cl-std=CL1.2"]
+        self._program = cl.Program(_queue().context, source.read_text()).build(options)
+        self._kernels: dict[str, Any] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        # one cl.Kernel per name: fetching it anew for each call is slow and warns
+        if name not in self._kernels:
+            self._kernels[name] = getattr(self._program, name)
+        kernel = self._kernels[name]
+
+        def launch(global_size: tuple[int, ...], local_size: tuple[int, ...] | None, *args: Any) -> None:
+            kernel(_queue(), global_size, local_size, *(getattr(a, "data", a) if not np.isscalar(a) else a
+                                                        for a in args))
+
+        return launch
+
+
+@functools.cache
+def _program(source: Path, defines: tuple[tuple[str, Any], ...]) -> Program:
+    return Program(source, dict(defines))
+
+
+def program(source: Path, **defines: Any) -> Program:
+    """The program of `source` (a .cl beside the .py that calls this), built once per set of -D defines."""
+    return _program(source, tuple(sorted(defines.items())))
+
+
+def to_device(values: np.ndarray) -> Any:
+    """A device array holding a C-order copy of `values`; `.get()` brings it back."""
+    import pyopencl.array as cl_array
+
+    return cl_array.to_device(_queue(), np.ascontiguousarray(values))
+
+
+def empty(shape: tuple[int, ...] | int, dtype: Any = np.float32) -> Any:
+    """An uninitialised device array."""
+    import pyopencl.array as cl_array
+
+    return cl_array.empty(_queue(), shape, dtype)
+
+
+def finish() -> None:
+    """Wait until the device has done all it was given (for timing)."""
+    _queue().finish()
