@@ -1,0 +1,41 @@
+"""What can go wrong for a user, and the exit code of each.
+
+0 done, 1 differs (`flowloom diff`), 2 bad input, 3 the environment lacks something, 4 storage or memory,
+130 interrupted (SIGINT), 143 terminated (SIGTERM). Each error is one line on stderr.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class FlowloomError(Exception):
+    """An error with an exit code; its text is the one line the user reads."""
+
+    exit_code: int
+
+
+class BadInput(FlowloomError):
+    """A scene, or a file it names, cannot be used: `file: key: reason`."""
+
+    exit_code = 2
+
+    def __init__(self, file: Path | str, key: str, reason: str):
+        self.file, self.key, self.reason = file, key, reason
+        super().__init__(": ".join(str(part) for part in (file, key, reason) if str(part)))
+
+
+class EnvironmentMissing(FlowloomError):
+    """The machine lacks what the work needs; the text says what, and how to mend it."""
+
+    exit_code = 3
+
+
+class StorageFailed(FlowloomError):
+    """A file could not be written or read back whole, or memory ran out."""
+
+    exit_code = 4
+
+
+class Terminated(BaseException):
+    """SIGTERM: raised in the main thread so that open work is closed cleanly (as KeyboardInterrupt is)."""
