@@ -67,7 +67,8 @@ def proven(variant: str, library: Path | None = None) -> str:
         command = [sys.executable, "-I", __file__, variant, *([str(library)] if library else [])]
         try:
             child = subprocess.run(
-                command, cwd=folder, env=environment, capture_output=True, text=True, timeout=PROOF_SECONDS
+                command, cwd=folder, env=environment, capture_output=True, text=True,
+                timeout=PROOF_SECONDS, check=False,
             )
         except subprocess.TimeoutExpired:
             return f"no picture after {PROOF_SECONDS:.0f} s"
@@ -161,7 +162,7 @@ def versions(variant: str) -> dict[str, str]:
     loaded = mitsuba(variant)
     import drjit
 
-    result = {"variant": variant, "mitsuba": loaded.__version__, "drjit": drjit.__version__}
+    result = {"variant": variant, "mitsuba": str(loaded.__version__), "drjit": drjit.__version__}
     if variant.startswith("llvm"):
         result["llvm"] = ".".join(map(str, drjit.detail.llvm_version()))
     return result
