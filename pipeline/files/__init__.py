@@ -1,0 +1,10 @@
+"""Files: each format has one home, and no file is ever half there.
+
+atomic      how every file comes into being: written beside its place, checked, then renamed
+shelter     how a stranger's file is read: in a child process, which a damaged file may take down
+volumes     OpenVDB: `density` and `vel` (its compiled part is openvdb.cpp)
+images      OpenEXR: linear pictures and 2-D fields
+pictures    8-bit PNG, and what OpenImageIO does with pictures
+meshes      PLY
+video       H.264
+"""

@@ -1,0 +1,167 @@
+"""OpenVDB files: 3-D fields in world units, grids `density` (fog volume) and `vel` (world units per second).
+
+Index (i, j, k) of a grid is (x, y, z) of an array (Z, Y, X); the transform takes it to the centre of that cell in
+the world: voxel_size * (i, j, k) + origin. OpenVDB keeps only voxels that are not zero, so the full shape is stored
+beside them. The same fields give the same bytes.
+
+Not read: rotated, sheared or anisotropic grids, staggered velocities, other types than float and vec3s.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import uuid
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import BadInput, StorageFailed
+from pipeline.files import atomic, shelter
+from synth.field import Field
+
+SHAPE = "flowloom_shape"  # grid metadata: cells along x, y, z
+MOST_VOXELS = 1024**3
+_UUID = slice(21, 57)  # where the header holds a random name of the file
+
+
+def write(path: Path, fields: Mapping[str, Field], *, metadata: Mapping[str, str] | None = None,
+          half: bool = False) -> None:
+    """Write 3-D fields of one grid to `path`, read them back and compare, then rename into place.
+
+    half    stores 16 bits per number: three decimal digits, up to 65,504
+
+    Raises ValueError for fields that are not 3-D, lie on different grids or do not fit into half floats;
+    `StorageFailed` if the file does not read back.
+    """
+    first, *others = fields.values()
+    for field in fields.values():
+        if field.dimension != 3:
+            raise ValueError(f"a volume has 3 dimensions, not {field.dimension}")
+        if half and float(np.abs(field.values).max()) > float(np.finfo(np.float16).max):
+            raise ValueError("values above 65,504 do not fit into half floats")
+    for field in others:
+        first.require_same_grid(field)
+
+    from pipeline.files import _openvdb
+
+    shape = " ".join(str(n) for n in reversed(first.shape))
+    grids = [(name, field.values, {SHAPE: shape}) for name, field in fields.items()]
+    with atomic.replacing(path) as temporary:
+        try:
+            _openvdb.write(str(temporary), grids, first.voxel_size, list(first.origin), dict(metadata or {}), half)
+        except RuntimeError as error:
+            raise StorageFailed(path, f"OpenVDB: {error}") from error
+        _name_by_content(temporary)
+        _check(path, temporary, fields, half)
+
+
+def _name_by_content(file: Path) -> None:
+    """Overwrite the random UUID in the header by one made of the content: same fields, same bytes."""
+    content = bytearray(file.read_bytes())
+    if len(content) < _UUID.stop:
+        return  # a full disk: the check says so
+    content[_UUID] = bytes(36)
+    name = uuid.UUID(bytes=hashlib.sha256(content).digest()[:16])
+    with file.open("r+b") as handle:
+        handle.seek(_UUID.start)
+        handle.write(str(name).encode())
+
+
+def _check(path: Path, temporary: Path, fields: Mapping[str, Field], half: bool) -> None:
+    """OpenVDB reports no full disk: only a file that reads back as it was meant is believed."""
+    try:
+        stored = read(temporary)
+    except BadInput as error:
+        raise StorageFailed(path, f"did not read back ({error.reason}); is the disk full?") from error
+    for name, field in fields.items():
+        values = field.values.astype(np.float16).astype(np.float32) if half else field.values
+        if name not in stored or stored[name] != field.with_values(values):
+            raise StorageFailed(path, f"grid '{name}' did not read back as it was written; is the disk full?")
+
+
+def read(path: Path) -> dict[str, Field]:
+    """The fields of a file that `write` made, by name. Raises `BadInput` if it is missing or damaged.
+
+    Reads in this process: a damaged file may abort it. For files whose checksum is known; others by `read_foreign`.
+    """
+    from pipeline.files import _openvdb
+
+    if not path.is_file():
+        raise BadInput(path, "", "no such file")
+    try:
+        grids, _ = _openvdb.contents(str(path))
+        return {grid["name"]: _field(_values(path, grid)) for grid in grids}
+    except (RuntimeError, ValueError) as error:
+        raise BadInput(path, "", f"damaged: {error}") from error
+
+
+def metadata(path: Path) -> dict[str, str]:
+    """The texts that `write` was given as metadata, of a file that `write` made."""
+    from pipeline.files import _openvdb
+
+    try:
+        _, texts = _openvdb.contents(str(path))
+    except RuntimeError as error:
+        raise BadInput(path, "", f"damaged: {error}") from error
+    return dict(texts)
+
+
+def read_foreign(path: Path, name: str) -> Field:
+    """Grid `name` of anybody's VDB file, read in a child process; its active voxels' box where no shape is stored.
+
+    Raises `BadInput`: no such file or grid, damaged, not read here (see above), NaN or infinity.
+    """
+    grid = shelter.read(_grid, path, name, name)
+    try:
+        return _field(grid)
+    except ValueError as error:
+        raise BadInput(path, name, str(error)) from error
+
+
+def _grid(path: Path, name: str) -> dict[str, Any]:
+    """Runs in the child: the grid's values, voxel size and origin, or ValueError."""
+    from pipeline.files import _openvdb
+
+    grids, _ = _openvdb.contents(str(path))
+    for grid in grids:
+        if grid["name"] == name:
+            return _values(path, grid)
+    raise ValueError(f"no such grid; the file holds: {', '.join(g['name'] for g in grids) or 'none'}")
+
+
+def _values(path: Path, grid: dict[str, Any]) -> dict[str, Any]:
+    """Values (Z, Y, X[, 3]), voxel size and origin of the first value, of a grid that `contents` described."""
+    from pipeline.files import _openvdb
+
+    if grid["type"] not in ("float", "vec3s"):
+        raise ValueError(f"a grid of type {grid['type']}; flowloom reads float and vec3s")
+    if grid["staggered"]:
+        raise ValueError("a staggered velocity; convert it to one with all components at the voxel's centre")
+    voxel_size, origin = _placement(grid["matrix"])
+    first, last = [], []
+    if SHAPE in grid["metadata"]:
+        first, last = [0, 0, 0], [int(n) - 1 for n in grid["metadata"][SHAPE].split()]
+    first, values = _openvdb.values(str(path), grid["name"], first, last, MOST_VOXELS)
+    corner = [o + voxel_size * i for o, i in zip(origin, first, strict=True)]
+    return {"values": values, "voxel_size": voxel_size, "origin": corner}
+
+
+def _placement(matrix: list[float]) -> tuple[float, list[float]]:
+    """Voxel size and origin of an index-to-world matrix (row vectors), if it holds nothing else."""
+    if not matrix:
+        raise ValueError("a frustum grid; flowloom reads uniform voxels")
+    transform = np.array(matrix).reshape(4, 4)
+    scales, turn = np.diag(transform)[:3], transform[:3, :3] - np.diag(np.diag(transform)[:3])
+    size = float(scales[0])
+    if not np.isfinite(transform).all() or size == 0 or np.abs(turn).max() > 1e-6 * abs(size) or scales.min() <= 0:
+        raise ValueError("a rotated, sheared or mirrored grid; flowloom reads grids along the world's axes")
+    if np.abs(scales - size).max() > 1e-6 * size:
+        sizes = " x ".join(f"{s:g}" for s in scales)
+        raise ValueError(f"anisotropic voxels ({sizes}); resample the grid to cubes")
+    return size, [float(o) for o in transform[3, :3]]
+
+
+def _field(grid: dict[str, Any]) -> Field:
+    return Field(grid["values"], grid["voxel_size"], tuple(grid["origin"]))
