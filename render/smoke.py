@@ -1,0 +1,202 @@
+"""Smoke as a picture: a lit sheet, ink on paper, or a volume in a studio.
+
+`lit` and `ink` draw a 2-D density (Y, X); `volume` path-traces a 3-D one (Z, Y, X) with Mitsuba. All take y up
+(row 0 is the bottom), return linear Rec.709 light (h, w, 3) float32 with the top row first, and give the same
+bits each time. What turns light into a picture stands in `render.film`: "filmic" for `lit` and `volume`,
+"straight" for `ink`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from scipy import ndimage
+
+from render import lic
+
+# The lit sheet. Lengths are shares of the picture's height, so a scene looks the same at any width.
+LAYERS = 20  # front to back
+THICKNESS = 0.075  # about the size of one motif
+OPTICAL_DEPTH = 7.0  # through the whole sheet where density and relief are 1
+DENSITY_POWER = 1.3  # above 1: thin smoke is thinner than linear, and edges read finer
+BODY, DETAIL = 0.035, 0.012  # blur radii that tell the plume's body from its detail
+KEY_LIGHT = np.array([1.00, 0.92, 0.82], np.float32) * 1.36  # warm, from the upper left, in front
+RIM_LIGHT = np.array([0.45, 0.68, 1.00], np.float32) * 1.04  # cool, from the right, behind
+SKY_LIGHT = np.array([0.42, 0.50, 0.66], np.float32) * 0.16  # from the front, everywhere
+BACKDROP_CENTRE = np.array([0.034, 0.044, 0.066], np.float32)
+BACKDROP_EDGE = np.array([0.009, 0.012, 0.019], np.float32)
+
+# Ink on paper: absorbance of each ink per unit of density, in red, green and blue.
+INKS = {
+    "indigo": (4.40, 3.30, 1.85),
+    "sepia": (1.80, 2.90, 4.40),
+    "black": (3.60, 3.52, 3.40),
+}
+PAPER = np.array([0.965, 0.952, 0.925], np.float32)
+PAPER_GRAIN = 0.012  # deviation of the paper's tone
+
+
+def checked_density(density: np.ndarray, dimensions: int) -> np.ndarray:
+    """`density` as float32; ValueError unless it has so many dimensions and is finite and not negative."""
+    density = np.asarray(density, np.float32)
+    if density.ndim != dimensions or min(density.shape) < 2:
+        axes = "(Y, X)" if dimensions == 2 else "(Z, Y, X)"
+        raise ValueError(f"expected a density {axes} of at least 2 cells each way, got {density.shape}")
+    if not np.isfinite(density).all():
+        raise ValueError("the density holds NaN or infinity")
+    if density.min() < 0.0:
+        raise ValueError(f"the density is negative: {density.min():g}")
+    return density
+
+
+def depth_towards(sigma: np.ndarray, towards: tuple[float, float]) -> np.ndarray:
+    """Optical depth (Y, X) from each cell to the border along the unit vector `towards` = (x, y).
+
+    sigma: (Y, X) float32, extinction per cell. One sweep over the rows (or columns), away from the light; the
+    linear interpolation between rows softens the shadow with distance, as a large light does.
+    """
+    if abs(towards[0]) > abs(towards[1]):
+        return depth_towards(sigma.T, (towards[1], towards[0])).T
+    if towards[1] < 0.0:
+        return depth_towards(sigma[::-1], (towards[0], -towards[1]))[::-1]
+    step = np.float32(1.0 / towards[1])
+    slope = np.float32(towards[0] * step)  # columns per row, at most 1
+    side, share = (1, slope) if slope >= 0.0 else (-1, -slope)
+    depth = np.zeros((sigma.shape[0], sigma.shape[1] + 2), np.float32)
+    half = np.pad(sigma, ((0, 0), (1, 1))) * (np.float32(0.5) * step)
+    inner, beside = slice(1, -1), slice(1 + side, sigma.shape[1] + 1 + side)
+    for row in range(sigma.shape[0] - 2, -1, -1):
+        passed = depth[row + 1] + half[row + 1]
+        depth[row, inner] = (1 - share) * passed[inner] + share * passed[beside] + half[row, inner]
+    return depth[:, inner]
+
+
+def directions(angle: float, spread: float, count: int) -> list[tuple[float, float]]:
+    """`count` unit vectors (x, y) round `angle`, over `spread` each way; degrees, counter-clockwise from +x.
+
+    A few directions stand in for the area of a light: their shadows overlap to a soft one.
+    """
+    angles = np.deg2rad(np.linspace(angle - spread, angle + spread, count))
+    return [(float(np.cos(a)), float(np.sin(a))) for a in angles]
+
+
+def _moved(values: np.ndarray, dx: float, dy: float, outside: float) -> np.ndarray:
+    """`values` (Y, X) read at (x + dx, y + dy), linear, `outside` beyond the border."""
+    ix, iy = int(np.floor(dx)), int(np.floor(dy))
+    fx, fy = np.float32(dx - ix), np.float32(dy - iy)
+    rim = max(abs(ix), abs(iy)) + 2
+    (h, w), padded = values.shape, np.pad(values, rim, constant_values=outside)
+    window = padded[rim + iy:rim + iy + h + 1, rim + ix:rim + ix + w + 1]
+    across = window[:, :-1] * (1 - fx) + window[:, 1:] * fx
+    return across[:-1] * (1 - fy) + across[1:] * fy
+
+
+def _relief(rho: np.ndarray) -> np.ndarray:
+    """Half thickness (Y, X) of the sheet, 1 = full: a rounded body that carries the detail of the density.
+
+    The body gives the plume its roundness; the detail turns the small differences of density inside it, which
+    an opaque sheet would hide, into slopes that catch the light.
+    """
+    height = rho.shape[0]
+    body = np.sqrt(np.clip(ndimage.gaussian_filter(rho, BODY * height), 0.0, 1.0))
+    detail = rho - ndimage.gaussian_filter(rho, DETAIL * height)
+    edge = np.sqrt(np.clip(rho / 0.25, 0.0, 1.0))
+    return np.clip(0.75 * body * edge + 0.25 * rho + 1.5 * detail, 0.0, 1.2)
+
+
+def _layers(rho: np.ndarray) -> np.ndarray:
+    """Optical depth (LAYERS, Y, X) of each layer of the sheet, seen straight on, front first."""
+    z = 2.0 * (np.arange(LAYERS, dtype=np.float32) + 0.5) / LAYERS - 1.0
+    inside = np.clip((_relief(rho) - np.abs(z)[:, None, None]) * (LAYERS / 2.5) + 0.5, 0.0, 1.0)
+    return (OPTICAL_DEPTH / LAYERS) * rho**DENSITY_POWER * inside
+
+
+def _shining_through(layers: np.ndarray, seen: np.ndarray, towards: list[tuple[float, float]], slope: float,
+                     density: float) -> np.ndarray:
+    """What the eye sees (Y, X) of a light that crosses the layers aslant, in the order in which they are given.
+
+    layers, seen: (LAYERS, Y, X), optical depth and the eye's weight; slope: cells across per cell of depth;
+    density: factor on the optical depth. Of the light 0.6 dies by the full extinction, 0.4 by a quarter of it:
+    light that is scattered again and again reaches deeper than one exponential says (Wrenninge 2013).
+    """
+    across = THICKNESS * layers.shape[1] / LAYERS * slope
+    slant = np.float32(density * np.hypot(1.0, slope))
+    total = np.zeros_like(layers[0])
+    for x, y in towards:
+        first, deep = np.full_like(total, 0.6), np.full_like(total, 0.4)
+        for layer, weight in zip(layers, seen, strict=True):
+            half = np.exp(-0.5 * slant * layer)
+            half_deep = np.sqrt(np.sqrt(half))
+            total += weight * (first * half + deep * half_deep)
+            first = _moved(first * half * half, x * across, y * across, 0.6)
+            deep = _moved(deep * half_deep * half_deep, x * across, y * across, 0.4)
+    return total / len(towards)
+
+
+def _sky(layers: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """What the eye sees (Y, X) of a light from all over the front, which spreads as it sinks in."""
+    cone = int(0.012 * layers.shape[1]) | 1
+    total, light = np.zeros_like(layers[0]), np.ones_like(layers[0])
+    for layer, weight in zip(layers, seen, strict=True):
+        total += weight * light * np.exp(-0.35 * layer)
+        light = ndimage.uniform_filter(light * np.exp(-0.7 * layer), cone, mode="nearest")
+    return total
+
+
+def _in_plane(rho: np.ndarray, towards: Iterable[tuple[float, float]], density: float, least: float) -> np.ndarray:
+    """Share (Y, X) of a light left after the smoke's whole width: the large shadow of the plume on itself."""
+    sigma = rho * np.float32(density / rho.shape[0])
+    shares = [np.exp(-depth_towards(sigma, d)) for d in towards]
+    return least + (1.0 - least) * np.mean(shares, axis=0, dtype=np.float32)
+
+
+def _backdrop(height: int, width: int) -> np.ndarray:
+    """A pool of light (height, width, 3) on a dark wall, behind the middle of the picture."""
+    y, x = np.mgrid[0:height, 0:width].astype(np.float32) / height
+    away = np.hypot((x - 0.5 * width / height) / 0.75, (y - 0.5) / 0.85)
+    pool = np.exp(-2.2 * away**2)[..., None]
+    return BACKDROP_EDGE + (BACKDROP_CENTRE - BACKDROP_EDGE) * pool
+
+
+def lit(density: np.ndarray, width: int) -> np.ndarray:
+    """A sheet of smoke (Y, X), shadowing itself, before a dark backdrop: linear light (h, width, 3).
+
+    The sheet has a thickness and is drawn in layers. A warm key shines slantwise through it from the front
+    left, a cool rim from behind on the right, a dim sky from the front; key and rim are also dimmed by the smoke
+    that lies between in the sheet's own plane. The smoke's shadow falls on the backdrop.
+    """
+    density = checked_density(density, 2)
+    height = lic.height_for(density.shape, width)
+    rho = lic.resampled(density, height, width)  # linear: cubic leaves dark halos
+    layers = _layers(rho)
+    passed = np.exp(-np.cumsum(layers, axis=0))
+    seen = np.concatenate([1.0 - passed[:1], passed[:-1] - passed[1:]])
+    key = _shining_through(layers, seen, directions(125.0, 12.0, 3), 2.2, 1.6)
+    rim = _shining_through(layers[::-1], seen[::-1], directions(30.0, 12.0, 2), 1.2, 0.8)
+    key *= _in_plane(rho, directions(125.0, 20.0, 3), 6.0, 0.12)
+    rim *= _in_plane(rho, directions(30.0, 20.0, 3), 9.0, 0.05)
+    sky = _sky(layers, seen) * _in_plane(rho, directions(90.0, 60.0, 3), 2.0, 0.3)
+    shadow = ndimage.gaussian_filter(_moved(passed[-1], -0.05 * height, 0.06 * height, 1.0), 0.03 * height)
+    light = passed[-1][..., None] * _backdrop(height, width) * (0.35 + 0.65 * shadow)[..., None]
+    light += key[..., None] * KEY_LIGHT + rim[..., None] * RIM_LIGHT + sky[..., None] * SKY_LIGHT
+    return light[::-1].copy()
+
+
+def _paper(height: int, width: int, seed: int) -> np.ndarray:
+    """Paper (height, width, 3): a warm white with a faint grain of two sizes."""
+    white = np.random.Generator(np.random.Philox(key=seed)).standard_normal((height, width), dtype=np.float32)
+    fine, coarse = (ndimage.gaussian_filter(white, radius, mode="wrap") for radius in (0.8, 6.0))
+    grain = 0.5 * (fine / fine.std() + coarse / coarse.std())
+    return PAPER * (1.0 + PAPER_GRAIN * np.clip(grain, -2.0, 2.0))[..., None]
+
+
+def ink(density: np.ndarray, width: int, colour: str = "indigo", seed: int = 1) -> np.ndarray:
+    """Ink (Y, X) on white paper by Beer-Lambert: light (h, width, 3) = paper * exp(-density * absorbance)."""
+    if colour not in INKS:
+        raise ValueError(f"unknown ink {colour!r}: one of {', '.join(INKS)}")
+    density = checked_density(density, 2)
+    height = lic.height_for(density.shape, width)
+    rho = lic.resampled(density, height, width)
+    absorbed = rho[..., None] * np.array(INKS[colour], np.float32)
+    return (_paper(height, width, seed) * np.exp(-absorbed))[::-1].copy()
