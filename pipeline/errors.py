@@ -32,9 +32,13 @@ class EnvironmentMissing(FlowloomError):
 
 
 class StorageFailed(FlowloomError):
-    """A file could not be written or read back whole, or memory ran out."""
+    """A file could not be written or read back whole, or memory ran out: `file: reason`."""
 
     exit_code = 4
+
+    def __init__(self, file: Path | str, reason: str):
+        self.file, self.reason = file, reason
+        super().__init__(f"{file}: {reason}")
 
 
 class Terminated(BaseException):

@@ -1,0 +1,144 @@
+"""Which files of an output folder are whole, and what each was made from: content decides, not time.
+
+A folder ends with its `manifest.json`, written last: for each file its size, its SHA-256, and the key of what
+it was made from (scene tables, sources, input files). A file is whole if it is there, hashes to its entry and
+its entry has the key that is asked for. So touching a file changes nothing; a deleted, truncated or damaged
+one is noticed and made again, it alone.
+
+While a stage works, each finished file has its entry as a note in `.whole/`; an interrupted run leaves the
+notes, and the next one goes on from them. Any number of processes may work in one folder: every write is a
+rename, and two that make the same file write the same bits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline.files import atomic
+
+MANIFEST = "manifest.json"
+NOTES = ".whole"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the manifest says of one file."""
+
+    key: str
+    size: int
+    sha256: str
+
+
+def digest(value: Any) -> str:
+    """SHA-256 of a JSON value in one spelling."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def file_sha256(file: Path) -> str:
+    """SHA-256 of a file's bytes."""
+    with open(file, "rb") as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()
+
+
+class Folder:
+    """The files of one output folder and their entries. `about` goes into the manifest, for the reader."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.entries: dict[str, Entry] = {}
+        self._verified: dict[str, tuple[int, int]] = {}
+        notes = path / NOTES
+        # the old manifest first: a note is newer
+        for file in [path / MANIFEST, notes / MANIFEST, *sorted(notes.glob("*.note"))]:
+            self.entries |= _read(file)
+
+    def whole(self, name: str, key: str) -> Entry | None:
+        """The entry of `name` if that file is whole and was made from `key`."""
+        entry = self.entries.get(name)
+        return entry if entry and entry.key == key and self._intact(name, entry) else None
+
+    def _intact(self, name: str, entry: Entry) -> bool:
+        try:
+            state = (self.path / name).stat()
+        except OSError:
+            return False
+        if state.st_size != entry.size:
+            return False
+        stamp = (state.st_mtime_ns, state.st_ino)
+        if self._verified.get(name) != stamp:
+            if file_sha256(self.path / name) != entry.sha256:
+                return False
+            self._verified[name] = stamp
+        return True
+
+    def add(self, name: str, key: str) -> Entry:
+        """Note that `name`, just written, is whole."""
+        notes = self.path / NOTES
+        notes.mkdir(exist_ok=True)
+        if (self.path / MANIFEST).exists():
+            # from here on the folder is not what its manifest says; its entries still hold for the other files
+            os.replace(self.path / MANIFEST, notes / MANIFEST)
+        file = self.path / name
+        entry = Entry(key, file.stat().st_size, file_sha256(file))
+        atomic.write_text(notes / f"{name}.note", _json({name: entry}))
+        self.entries[name] = entry
+        return entry
+
+    def close(self, keys: Mapping[str, str], about: Mapping[str, Any]) -> bool:
+        """If every file of `keys` (name: key) is whole, write the manifest and tidy up; else return False."""
+        found = {name: self.whole(name, key) for name, key in keys.items()}
+        whole = {name: entry for name, entry in found.items() if entry}
+        if len(whole) < len(keys):
+            return False
+        written = _json(whole, about)
+        manifest = self.path / MANIFEST
+        if not manifest.exists() or manifest.read_text() != written:
+            atomic.write_text(manifest, written)
+        self._remove(name for name in self.entries if name not in keys)
+        self.entries = whole
+        _remove_notes(self.path)
+        return True
+
+    def discard(self) -> None:
+        """Remove the files that the manifest and the notes name, them, and the folder if nothing else is in it."""
+        self._remove(self.entries)
+        (self.path / MANIFEST).unlink(missing_ok=True)
+        _remove_notes(self.path)
+        try:
+            self.path.rmdir()
+        except OSError:
+            pass  # the user keeps something of their own here
+
+    def _remove(self, names: Iterable[str]) -> None:
+        for name in names:
+            (self.path / name).unlink(missing_ok=True)
+
+
+def _remove_notes(path: Path) -> None:
+    notes = path / NOTES
+    for file in notes.glob("*") if notes.is_dir() else ():
+        file.unlink(missing_ok=True)
+    try:
+        notes.rmdir()
+    except OSError:
+        pass  # not there, or another process is writing its own note
+
+
+def _json(entries: Mapping[str, Entry], about: Mapping[str, Any] | None = None) -> str:
+    files = {name: asdict(entries[name]) for name in sorted(entries)}
+    return json.dumps({**(about or {}), "files": files}, indent=1, ensure_ascii=False) + "\n"
+
+
+def _read(file: Path) -> dict[str, Entry]:
+    """The entries of a manifest or a note; none if it is missing or damaged: its files are then made again."""
+    try:
+        files = json.loads(file.read_text())["files"]
+        return {name: Entry(**entry) for name, entry in files.items() if Path(name).name == name}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+        return {}

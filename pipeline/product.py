@@ -1,0 +1,82 @@
+"""What a product is: one series of files that a stage makes, and what its content depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from pipeline.manifest import file_sha256
+from pipeline.schema import Scene
+
+Frames = Literal["same", "until", "once"]
+
+
+class Stock(Protocol):
+    """What a product is made from: the files that are whole, read on demand."""
+
+    def read(self, product: str, frame: int = 0) -> Any:
+        """The value of an input product's frame (0: the one file of a product that is not animated)."""
+
+    def own(self, frame: int) -> Any | None:
+        """The product's own frame, if it is whole."""
+
+    @property
+    def work(self) -> Path:
+        """A folder for what an interrupted run needs to go on; emptied when the product is whole."""
+
+
+@dataclass(frozen=True)
+class Product:
+    """One series of files, `name.0001.suffix` …, or the one file `name.suffix`.
+
+    reads   dotted keys of the scene that its content depends on
+    inputs  products it is made from, and which of their frames frame i needs: the "same", all "until" and with
+            i, or the one file there is ("once")
+    make    make(scene, stock, frames): yields (frame, value) for each of `frames` (ascending), in that order
+    write   write(file, value, scene); `read` is its inverse
+    """
+
+    name: str
+    stage: str
+    folder: str
+    suffix: Callable[[Scene], str]
+    reads: tuple[str, ...]
+    inputs: tuple[tuple[str, Frames], ...]
+    make: Callable[[Scene, Stock, list[int]], Iterator[tuple[int, Any]]]
+    write: Callable[[Path, Any, Scene], None]
+    read: Callable[[Path, Scene], Any]
+    animated: bool = True
+
+    def file(self, scene: Scene, frame: int) -> str:
+        """File name of a frame."""
+        return f"{self.name}.{frame:04d}.{self.suffix(scene)}" if self.animated else f"{self.name}.{self.suffix(scene)}"
+
+    def frames(self, scene: Scene) -> list[int]:
+        """The frames there are: 1 to scene.frames, or [0]."""
+        return list(range(1, scene.frames + 1)) if self.animated else [0]
+
+    def tables(self, scene: Scene) -> dict[str, Any]:
+        """The values of `reads`, files by their content."""
+        return {key: _plain(_at(scene, key)) for key in self.reads}
+
+
+def _at(scene: Scene, key: str) -> Any:
+    value: Any = scene
+    for part in key.split("."):
+        value = getattr(value, part, None)
+    return value
+
+
+def _plain(value: Any) -> Any:
+    """A scene value as JSON; a file as the SHA-256 of its bytes."""
+    if isinstance(value, Path):
+        return file_sha256(value)
+    if hasattr(value, "model_dump"):
+        return _plain({name: getattr(value, name) for name in type(value).model_fields})
+    if isinstance(value, dict):
+        return {name: _plain(v) for name, v in value.items()}
+    if isinstance(value, tuple):
+        return [_plain(v) for v in value]
+    return value
