@@ -87,7 +87,7 @@ def lines(v: np.ndarray, width: int, seed: int = 1) -> np.ndarray:
     rows, columns = height_for(v.shape, width) * OVERSAMPLING, width * OVERSAMPLING
     fine = resampled(v, rows, columns)
     noise = _noise(rows, columns, seed)
-    length = int(STREAK * max(rows, columns)) // 4 * 2 + 1  # odd: as far forward as back; two passes double it
+    length = int(STREAK * max(rows, columns)) // 4 * 2 + 1  # odd: as far forward as back; two passes
     kernel = np.hanning(length + 2)[1:-1].astype(np.float32)
     streaks = rlic.convolve(noise, np.ascontiguousarray(fine[..., 0]), np.ascontiguousarray(fine[..., 1]),
                             kernel=kernel / kernel.sum(), iterations=2)

@@ -1,19 +1,21 @@
 """Smoke as a picture: a lit sheet, ink on paper, or a volume in a studio.
 
-`lit` and `ink` draw a 2-D density (Y, X); `volume` path-traces a 3-D one (Z, Y, X) with Mitsuba. All take y up
-(row 0 is the bottom), return linear Rec.709 light (h, w, 3) float32 with the top row first, and give the same
-bits each time. What turns light into a picture stands in `render.film`: "filmic" for `lit` and `volume`,
-"straight" for `ink`.
+`lit` and `ink` draw a 2-D density (Y, X); `volume` path-traces a 3-D one (Z, Y, X) with Mitsuba. All take y
+up (row 0 is the bottom), return linear Rec.709 light (h, w, 3) float32 with the top row first, and give the
+same bits each time. `render.film` turns light into a picture: "filmic" for `lit` and `volume`, "straight"
+for `ink`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
 
-from render import lic
+from render import backend, lic, studio
 
 # The lit sheet. Lengths are shares of the picture's height, so a scene looks the same at any width.
 LAYERS = 20  # front to back
@@ -35,6 +37,13 @@ INKS = {
 }
 PAPER = np.array([0.965, 0.952, 0.925], np.float32)
 PAPER_GRAIN = 0.012  # deviation of the paper's tone
+
+# The volume.
+SMOKE_ALBEDO = (0.955, 0.96, 0.968)
+SMOKE_FORWARD = 0.2  # mean cosine of the scattering angle
+MAX_DEPTH = 48
+MOST_DENSITY = 1e3  # delta tracking steps by the largest extinction: one cell of 1e8 takes for ever
+MOST_SAMPLES = 2**30  # in one pass; Mitsuba's memory explodes above 2^32
 
 
 def checked_density(density: np.ndarray, dimensions: int) -> np.ndarray:
@@ -114,11 +123,11 @@ def _layers(rho: np.ndarray) -> np.ndarray:
 
 def _shining_through(layers: np.ndarray, seen: np.ndarray, towards: list[tuple[float, float]], slope: float,
                      density: float) -> np.ndarray:
-    """What the eye sees (Y, X) of a light that crosses the layers aslant, in the order in which they are given.
+    """What the eye sees (Y, X) of a light that crosses the layers aslant, in the order they are given in.
 
     layers, seen: (LAYERS, Y, X), optical depth and the eye's weight; slope: cells across per cell of depth;
-    density: factor on the optical depth. Of the light 0.6 dies by the full extinction, 0.4 by a quarter of it:
-    light that is scattered again and again reaches deeper than one exponential says (Wrenninge 2013).
+    density: factor on the optical depth. Of the light 0.6 dies by the full extinction, 0.4 by a quarter of
+    it: scattered again and again it reaches deeper than one exponential says (Wrenninge 2013).
     """
     across = THICKNESS * layers.shape[1] / LAYERS * slope
     slant = np.float32(density * np.hypot(1.0, slope))
@@ -144,7 +153,8 @@ def _sky(layers: np.ndarray, seen: np.ndarray) -> np.ndarray:
     return total
 
 
-def _in_plane(rho: np.ndarray, towards: Iterable[tuple[float, float]], density: float, least: float) -> np.ndarray:
+def _in_plane(rho: np.ndarray, towards: Iterable[tuple[float, float]], density: float,
+              least: float) -> np.ndarray:
     """Share (Y, X) of a light left after the smoke's whole width: the large shadow of the plume on itself."""
     sigma = rho * np.float32(density / rho.shape[0])
     shares = [np.exp(-depth_towards(sigma, d)) for d in towards]
@@ -163,8 +173,8 @@ def lit(density: np.ndarray, width: int) -> np.ndarray:
     """A sheet of smoke (Y, X), shadowing itself, before a dark backdrop: linear light (h, width, 3).
 
     The sheet has a thickness and is drawn in layers. A warm key shines slantwise through it from the front
-    left, a cool rim from behind on the right, a dim sky from the front; key and rim are also dimmed by the smoke
-    that lies between in the sheet's own plane. The smoke's shadow falls on the backdrop.
+    left, a cool rim from behind on the right, a dim sky from the front; each is also dimmed by the smoke that
+    lies between in the sheet's own plane. The smoke's shadow falls on the backdrop.
     """
     density = checked_density(density, 2)
     height = lic.height_for(density.shape, width)
@@ -200,3 +210,136 @@ def ink(density: np.ndarray, width: int, colour: str = "indigo", seed: int = 1) 
     rho = lic.resampled(density, height, width)
     absorbed = rho[..., None] * np.array(INKS[colour], np.float32)
     return (_paper(height, width, seed) * np.exp(-absorbed))[::-1].copy()
+
+
+@dataclass(frozen=True)
+class VolumeSettings:
+    """How `volume` looks at a density. Lengths in world units.
+
+    extinction: per world unit at density 1; spp: paths per pixel; bowl: (radius, height) of the bowl that the
+    plume rises from, None for none.
+    """
+
+    width: int = 512
+    height: int = 640
+    spp: int = 64
+    seed: int = 1
+    extinction: float = 60.0
+    bowl: tuple[float, float] | None = None
+    camera: studio.Camera = studio.Camera()
+
+
+def active_box(density: np.ndarray) -> tuple[slice, slice, slice]:
+    """The smallest box (z, y, x slices) that holds all smoke and a border of one empty cell where there is one."""
+    occupied = density > 0.0
+    box = []
+    for axis in range(3):
+        where = np.flatnonzero(occupied.any(axis=tuple(a for a in range(3) if a != axis)))
+        box.append(slice(max(where[0] - 1, 0), min(where[-1] + 2, density.shape[axis])))
+    return box[0], box[1], box[2]
+
+
+def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, float],
+           settings: VolumeSettings = VolumeSettings()) -> np.ndarray:
+    """A path-traced picture (height, width, 3) of a density (Z, Y, X) in the studio, linear light.
+
+    voxel_size, origin: of the grid in world units, origin at the centre of cell (0, 0, 0), order x, y, z.
+    Raises ValueError for what Mitsuba would answer with a black picture, a hang or exhausted memory.
+    """
+    density = checked_density(density, 3)
+    if density.max() > MOST_DENSITY:
+        raise ValueError(f"a density of {density.max():g} is more than the {MOST_DENSITY:g} that can be rendered")
+    mi = backend.mitsuba("scalar_rgb")
+    scene = _stage(mi, settings) | _lights(mi)
+    if density.any():
+        scene["smoke"] = _medium(mi, density, voxel_size, origin, settings.extinction)
+    return _photographed(mi, scene, settings)
+
+
+def _photographed(mi: Any, scene: dict[str, Any], settings: VolumeSettings) -> np.ndarray:
+    """Renders `scene` in passes of at most MOST_SAMPLES samples; their mean (height, width, 3) float32."""
+    camera = settings.camera
+    scene = scene | {
+        "type": "scene",
+        # roulette would run at every null collision and make fireflies: off, up to the last bounce
+        "integrator": {"type": "volpath", "max_depth": MAX_DEPTH, "rr_depth": MAX_DEPTH},
+        "sensor": {
+            "type": "perspective", "fov": camera.fov, "fov_axis": "y",
+            "to_world": mi.ScalarTransform4f().look_at(
+                origin=list(camera.position), target=list(camera.target), up=[0, 1, 0]),
+            "film": {"type": "hdrfilm", "width": settings.width, "height": settings.height,
+                     "pixel_format": "rgb", "component_format": "float32", "rfilter": {"type": "box"}},
+            "sampler": {"type": "independent"},
+        },
+    }
+    loaded = mi.load_dict(scene)
+    most = max(1, MOST_SAMPLES // (settings.width * settings.height))
+    light, done = np.zeros((settings.height, settings.width, 3), np.float64), 0
+    while done < settings.spp:
+        count = min(most, settings.spp - done)
+        light += count * np.array(mi.render(loaded, spp=count, seed=settings.seed + done), np.float64)
+        done += count
+    return (light / settings.spp).astype(np.float32)
+
+
+def _medium(mi: Any, density: np.ndarray, voxel_size: float, origin: tuple[float, float, float],
+            extinction: float) -> dict[str, Any]:
+    """The smoke as a Mitsuba shape: a box without a surface, cropped to the cells that hold any smoke."""
+    box = active_box(density)
+    cells = np.array([s.stop - s.start for s in box[::-1]], np.float64)  # x, y, z
+    low = np.array(origin) + (np.array([s.start for s in box[::-1]]) - 0.5) * voxel_size
+    size = cells * voxel_size
+    transform = mi.ScalarTransform4f
+    grid = mi.VolumeGrid(np.ascontiguousarray(density[box][..., None]))
+    return {
+        "type": "cube",
+        "to_world": transform().translate(list(low + 0.5 * size)).scale(list(0.5 * size)),
+        "bsdf": {"type": "null"},
+        "interior": {
+            "type": "heterogeneous",
+            "sigma_t": {"type": "gridvolume", "grid": grid, "raw": True,
+                        "to_world": transform().translate(list(low)).scale(list(size))},
+            "scale": extinction,
+            "albedo": {"type": "rgb", "value": list(SMOKE_ALBEDO)},
+            "phase": {"type": "hg", "g": SMOKE_FORWARD},
+        },
+    }
+
+
+def _mesh(mi: Any, mesh: studio.Mesh, colour: studio.Point) -> Any:
+    """A diffuse Mitsuba shape of a studio mesh, both sides alike."""
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(
+        {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(colour)}}})
+    shape = mi.Mesh("mesh", len(mesh.vertices), len(mesh.faces), props=properties)
+    parameters = mi.traverse(shape)
+    parameters["vertex_positions"] = np.ascontiguousarray(mesh.vertices, np.float32).ravel()
+    parameters["faces"] = np.ascontiguousarray(mesh.faces, np.uint32).ravel()
+    parameters.update()
+    return shape
+
+
+def _stage(mi: Any, settings: VolumeSettings) -> dict[str, Any]:
+    """Backdrop and bowl."""
+    stage = {"backdrop": _mesh(mi, studio.backdrop(), studio.BACKDROP_COLOUR)}
+    if settings.bowl:
+        stage["bowl"] = _mesh(mi, studio.bowl(*settings.bowl), studio.BOWL_COLOUR)
+    return stage
+
+
+def _lights(mi: Any) -> dict[str, Any]:
+    """Key, rim and sky; `sampling_weight` sends most shadow rays to the two that matter."""
+    lights: dict[str, Any] = {
+        "sky": {"type": "constant", "radiance": {"type": "rgb", "value": list(studio.SKY)},
+                "sampling_weight": studio.SKY_SHARE},
+    }
+    for name, box in (("key", studio.KEY), ("rim", studio.RIM)):
+        lights[name] = {
+            "type": "rectangle",
+            "to_world": mi.ScalarTransform4f().look_at(
+                origin=list(box.position), target=list(box.target), up=[0, 1, 0]
+            ).scale([0.5 * box.size[0], 0.5 * box.size[1], 1.0]),
+            "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(box.radiance)},
+                        "sampling_weight": box.share},
+        }
+    return lights

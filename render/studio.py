@@ -1,0 +1,107 @@
+"""The studio a volume is photographed in: camera, lights, seamless backdrop and the bowl the smoke rises from.
+
+Everything is plain numbers and vertex/face arrays in world units (y up, floor at y = 0, the subject about one
+unit high, centred on x = z = 0); `render.smoke` hands them to Mitsuba, a pipeline may write them as meshes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """vertices (N, 3) float32 in world units; faces (M, 3) uint32, counter-clockwise seen from outside."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A long lens at the height of the subject; `fov` is the vertical angle of view in degrees."""
+
+    position: Point = (0.0, 0.92, 6.2)
+    target: Point = (0.0, 0.475, 0.0)
+    fov: float = 11.4
+
+
+@dataclass(frozen=True)
+class Softbox:
+    """A rectangular light of `size` (width, height), its face turned to `target`.
+
+    radiance: red, green, blue; share: how often the renderer chooses it, relative to the other lights.
+    """
+
+    position: Point
+    target: Point
+    size: tuple[float, float]
+    radiance: Point
+    share: float
+
+
+KEY = Softbox((-2.6, 2.9, 2.3), (0.0, 0.4, 0.0), (1.5, 1.5), (13.0, 12.0, 10.8), 1.0)
+RIM = Softbox((2.5, 2.0, -2.2), (0.0, 0.5, 0.0), (1.0, 1.8), (7.0, 9.2, 13.0), 1.0)
+SKY: Point = (0.055, 0.068, 0.09)  # radiance of the dim light from everywhere
+SKY_SHARE = 0.15
+BACKDROP_COLOUR: Point = (0.15, 0.17, 0.205)
+BOWL_COLOUR: Point = (0.20, 0.19, 0.18)
+
+
+def extruded(profile: np.ndarray, half_width: float) -> Mesh:
+    """The surface that a profile (N, 2) of (z, y) sweeps from x = -half_width to half_width."""
+    profile = np.asarray(profile, np.float32)
+    count = len(profile)
+    vertices = np.empty((2, count, 3), np.float32)
+    vertices[0, :, 0], vertices[1, :, 0] = -half_width, half_width
+    vertices[:, :, 1], vertices[:, :, 2] = profile[:, 1], profile[:, 0]
+    left = np.arange(count - 1, dtype=np.uint32)
+    right = left + count
+    faces = np.concatenate([np.stack([left, right, right + 1], 1), np.stack([left, right + 1, left + 1], 1)])
+    return Mesh(vertices.reshape(-1, 3), faces.astype(np.uint32))
+
+
+def revolved(profile: np.ndarray, segments: int = 192) -> Mesh:
+    """The surface that a profile (N, 2) of (radius, y) sweeps round the y axis, bottom outside first."""
+    profile = np.asarray(profile, np.float32)
+    count = len(profile)
+    angle = np.arange(segments, dtype=np.float32) * np.float32(2.0 * np.pi / segments)
+    vertices = np.empty((segments, count, 3), np.float32)
+    vertices[..., 0] = profile[:, 0] * np.cos(angle)[:, None]
+    vertices[..., 1] = profile[:, 1]
+    vertices[..., 2] = profile[:, 0] * np.sin(angle)[:, None]
+    ring, point = np.meshgrid(np.arange(segments), np.arange(count - 1), indexing="ij")
+    here, there = (ring * count + point).ravel(), ((ring + 1) % segments * count + point).ravel()
+    faces = np.concatenate([np.stack([here, here + 1, there + 1], 1), np.stack([here, there + 1, there], 1)])
+    return Mesh(vertices.reshape(-1, 3), faces.astype(np.uint32))
+
+
+def _arc(centre: tuple[float, float], radii: tuple[float, float], start: float, end: float,
+         count: int = 24) -> np.ndarray:
+    """Points (count, 2) of an elliptic arc from `start` to `end` degrees."""
+    angle = np.deg2rad(np.linspace(start, end, count))
+    return np.stack([centre[0] + radii[0] * np.cos(angle), centre[1] + radii[1] * np.sin(angle)], axis=1)
+
+
+def backdrop() -> Mesh:
+    """A cyclorama: the floor, a wide curve, the wall; no horizon shows."""
+    curve = _arc((-2.2, 2.4), (2.4, 2.4), 270.0, 180.0, 48)
+    return extruded(np.concatenate([[(9.0, 0.0)], curve, [(-4.6, 9.0)]]), half_width=14.0)
+
+
+def bowl(radius: float, height: float) -> Mesh:
+    """A thick-walled stone bowl on a foot, open at the top: `radius` of its mouth inside, `height` of its rim.
+
+    The smoke's source lies within it, so that the plume rises out of something instead of out of a cut.
+    """
+    wall = 0.16 * radius
+    outer = radius + wall
+    foot = [(0.0, 0.0), (0.60 * outer, 0.0), (0.62 * outer, 0.06 * height)]
+    side = _arc((0.58 * outer, height - 0.5 * wall), (0.42 * outer, 0.88 * height - 0.5 * wall), -90.0, 0.0)
+    lip = _arc((radius + 0.5 * wall, height - 0.5 * wall), (0.5 * wall, 0.5 * wall), 0.0, 180.0, 12)
+    inside = _arc((0.0, height - 0.5 * wall), (radius, 0.72 * height - 0.5 * wall), 0.0, -90.0, 24)
+    return revolved(np.concatenate([foot, side, lip[1:], inside[1:]]))
