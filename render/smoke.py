@@ -157,8 +157,8 @@ def _in_plane(rho: np.ndarray, towards: Iterable[tuple[float, float]], density: 
               least: float) -> np.ndarray:
     """Share (Y, X) of a light left after the smoke's whole width: the large shadow of the plume on itself."""
     sigma = rho * np.float32(density / rho.shape[0])
-    shares = [np.exp(-depth_towards(sigma, d)) for d in towards]
-    return least + (1.0 - least) * np.mean(shares, axis=0, dtype=np.float32)
+    shares = np.stack([np.exp(-depth_towards(sigma, d)) for d in towards])
+    return np.asarray(least + (1.0 - least) * shares.mean(axis=0))
 
 
 def _backdrop(height: int, width: int) -> np.ndarray:
@@ -226,11 +226,11 @@ class VolumeSettings:
     seed: int = 1
     extinction: float = 60.0
     bowl: tuple[float, float] | None = None
-    camera: studio.Camera = studio.Camera()
+    camera: studio.Camera = studio.CAMERA
 
 
 def active_box(density: np.ndarray) -> tuple[slice, slice, slice]:
-    """The smallest box (z, y, x slices) that holds all smoke and a border of one empty cell where there is one."""
+    """The smallest box (z, y, x slices) of all smoke, and one empty cell round it where the grid has one."""
     occupied = density > 0.0
     box = []
     for axis in range(3):
@@ -248,7 +248,7 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
     """
     density = checked_density(density, 3)
     if density.max() > MOST_DENSITY:
-        raise ValueError(f"a density of {density.max():g} is more than the {MOST_DENSITY:g} that can be rendered")
+        raise ValueError(f"a density of {density.max():g} is too much to render (at most {MOST_DENSITY:g})")
     mi = backend.mitsuba("scalar_rgb")
     scene = _stage(mi, settings) | _lights(mi)
     if density.any():
@@ -308,9 +308,9 @@ def _medium(mi: Any, density: np.ndarray, voxel_size: float, origin: tuple[float
 
 def _mesh(mi: Any, mesh: studio.Mesh, colour: studio.Point) -> Any:
     """A diffuse Mitsuba shape of a studio mesh, both sides alike."""
+    paint = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(colour)}}
     properties = mi.Properties()
-    properties["bsdf"] = mi.load_dict(
-        {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(colour)}}})
+    properties["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": paint})
     shape = mi.Mesh("mesh", len(mesh.vertices), len(mesh.faces), props=properties)
     parameters = mi.traverse(shape)
     parameters["vertex_positions"] = np.ascontiguousarray(mesh.vertices, np.float32).ravel()

@@ -1,4 +1,4 @@
-"""The studio a volume is photographed in: camera, lights, seamless backdrop and the bowl the smoke rises from.
+"""The studio a volume is photographed in: camera, lights, seamless backdrop, the bowl smoke rises from.
 
 Everything is plain numbers and vertex/face arrays in world units (y up, floor at y = 0, the subject about one
 unit high, centred on x = z = 0); `render.smoke` hands them to Mitsuba, a pipeline may write them as meshes.
@@ -44,6 +44,7 @@ class Softbox:
     share: float
 
 
+CAMERA = Camera()
 KEY = Softbox((-2.6, 2.9, 2.3), (0.0, 0.4, 0.0), (1.5, 1.5), (13.0, 12.0, 10.8), 1.0)
 RIM = Softbox((2.5, 2.0, -2.2), (0.0, 0.5, 0.0), (1.0, 1.8), (7.0, 9.2, 13.0), 1.0)
 SKY: Point = (0.055, 0.068, 0.09)  # radiance of the dim light from everywhere
@@ -94,7 +95,7 @@ def backdrop() -> Mesh:
 
 
 def bowl(radius: float, height: float) -> Mesh:
-    """A thick-walled stone bowl on a foot, open at the top: `radius` of its mouth inside, `height` of its rim.
+    """A thick-walled stone bowl on a foot, open at the top: inner `radius` of its mouth, `height` of its rim.
 
     The smoke's source lies within it, so that the plume rises out of something instead of out of a cut.
     """

@@ -1,0 +1,201 @@
+"""Figures as papers print them: panels in rows on white, thin frames, a label below each, insets, a legend.
+
+The lettering is Droid Serif (Apache 2.0), which the OpenImageIO package brings along; Greek letters, which it
+lacks, are Droid Sans Mono's. Labels may hold `*asterisks*` for italics, as a paper sets its symbols.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from render import film
+
+FRAME = 0.45  # display grey of the thin frame round a panel
+INK = 0.10  # display grey of the lettering
+LATIN = "àâäçéèêëïîôöùûüÀÄÇÉÈÖÜß×÷±²³°·–—‘’“”…"  # what Droid Serif has beyond ASCII, as far as labels need it
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One picture of a figure.
+
+    picture: (h, w, 3) uint8 sRGB or float display values, top row first; label: set below it, "" for none;
+    inset: a smaller picture for the lower left corner; legend: a disc (s, s, 4) for the lower right one
+    (`lic.wheel`); frame: whether a thin line goes round it.
+    """
+
+    picture: np.ndarray
+    label: str = ""
+    inset: np.ndarray | None = None
+    legend: np.ndarray | None = None
+    frame: bool = True
+
+
+def display(picture: np.ndarray) -> np.ndarray:
+    """A panel's picture (h, w, 3) as float32 display values in [0, 1]."""
+    if picture.ndim != 3 or picture.shape[2] != 3:
+        raise ValueError(f"expected a picture (h, w, 3), got {picture.shape}")
+    return picture.astype(np.float32) / 255.0 if picture.dtype == np.uint8 else picture.astype(np.float32)
+
+
+def fitted(picture: np.ndarray, width: int) -> np.ndarray:
+    """`picture` (h, w, 3) at `width` pixels, kept crisp: pixels repeated upwards, averaged by area downwards.
+
+    Averaging is done on linear light, so thin bright lines keep their brightness.
+    """
+    shown = display(picture)
+    h, w = shown.shape[:2]
+    if w == width:
+        return shown
+    height = max(1, round(h * width / w))
+    if width > w:
+        rows, columns = np.arange(height) * h // height, np.arange(width) * w // width
+        return np.ascontiguousarray(shown[rows][:, columns])
+    narrower = _averaged_rows(_averaged_rows(_linear(shown), height).swapaxes(0, 1), width).swapaxes(0, 1)
+    return film.encoded(narrower).astype(np.float32)
+
+
+def _linear(shown: np.ndarray) -> np.ndarray:
+    """The inverse of `film.encoded`."""
+    return np.where(shown <= 0.04045, shown / 12.92, ((np.maximum(shown, 0.04045) + 0.055) / 1.055) ** 2.4)
+
+
+def _averaged_rows(values: np.ndarray, count: int) -> np.ndarray:
+    """`values` (n, ...) as `count` rows, each the exact mean of the rows and parts of rows it covers."""
+    n = len(values)
+    sums = np.pad(np.cumsum(values, axis=0, dtype=np.float64), ((1, 0), *((0, 0),) * (values.ndim - 1)))
+    edges = np.arange(count + 1) * (n / count)
+    low = np.minimum(edges.astype(int), n - 1)
+    share = (edges - low).reshape(-1, *[1] * (values.ndim - 1))
+    at_edges = sums[low] * (1.0 - share) + sums[low + 1] * share
+    return np.diff(at_edges, axis=0) * (count / n)
+
+
+@functools.cache
+def _font(name: str) -> str:
+    import OpenImageIO
+
+    path = Path(OpenImageIO.__file__).parent / "share" / "fonts" / "OpenImageIO" / f"{name}.ttf"
+    if not path.is_file():
+        raise ValueError(f"the lettering's font is missing: {path}; run make setup")
+    return str(path)
+
+
+def _line_height(size: int) -> int:
+    return round(1.4 * size)
+
+
+def lettering(text: str, size: int) -> np.ndarray:
+    """One line of text as coverage (h, w) float32 in [0, 1], `size` pixels to the em, cut to its own width.
+
+    All lines of one size have the same height and the same base line.
+    """
+    drawn = [np.zeros((_line_height(size), 0), np.float32)]
+    for number, piece in enumerate(text.split("*")):
+        italic = number % 2 == 1
+        for latin, run in itertools.groupby(piece, lambda c: c.isascii() or c in LATIN):
+            words = "".join(run)
+            if latin:
+                drawn.append(_drawn(words, size, "DroidSerif-Italic" if italic else "DroidSerif"))
+            else:
+                drawn.append(_leaning(_drawn(words, size, "DroidSansMono"), size))
+    return np.concatenate(drawn, axis=1)
+
+
+def _drawn(text: str, size: int, font: str) -> np.ndarray:
+    """Coverage (line height, advance) of `text` in one font."""
+    import OpenImageIO as oiio
+
+    def advance(words: str) -> int:
+        return int(oiio.ImageBufAlgo.text_size(words, size, _font(font)).xend)
+
+    # the box of a text ends with its ink: a bar behind it shows the advance, blanks included
+    wide = max(1, advance(text + "|") - advance("|"))
+    page = oiio.ImageBuf(oiio.ImageSpec(wide + size, _line_height(size), 1, "float"))
+    oiio.ImageBufAlgo.zero(page)
+    if not oiio.ImageBufAlgo.render_text(page, 0, round(1.05 * size), text, size, _font(font), (1.0,)):
+        raise ValueError(f"cannot letter {text!r}: {page.geterror()}")
+    return np.asarray(page.get_pixels(oiio.FLOAT))[:, :wide, 0]
+
+
+def _leaning(upright: np.ndarray, size: int) -> np.ndarray:
+    """Greek letters slanted about the base line: they are symbols, and the serif has none of its own."""
+    columns = np.arange(upright.shape[1])
+    shifts = 0.2 * (np.arange(len(upright)) - round(0.8 * size))
+    return np.stack([np.interp(columns + s, columns, line, left=0.0, right=0.0)
+                     for s, line in zip(shifts, upright, strict=True)]).astype(np.float32)
+
+
+def figure(rows: Sequence[Sequence[Panel]], *, letter: int = 26, gap: int = 20,
+           margin: int = 28) -> np.ndarray:
+    """Panels in rows (each its own widths) as one picture (h, w, 3) uint8 sRGB on white.
+
+    Panels keep their pixels; those of a row stand on one base line. letter, gap, margin: pixels.
+    """
+    if not rows or not all(rows):
+        raise ValueError("a figure needs at least one panel in each row")
+    strips = [_row([_finished(panel) for panel in row], [panel.label for panel in row], letter, gap)
+              for row in rows]
+    width = max(strip.shape[1] for strip in strips)
+    padded = [_centred(strip, width) for strip in strips]
+    spaced = [padded[0]]
+    for strip in padded[1:]:
+        spaced += [np.ones((gap, width, 3), np.float32), strip]
+    sheet = np.pad(np.concatenate(spaced), ((margin, margin), (margin, margin), (0, 0)), constant_values=1.0)
+    return film.eight_bit(sheet)
+
+
+def _centred(strip: np.ndarray, width: int) -> np.ndarray:
+    left = (width - strip.shape[1]) // 2
+    right = width - strip.shape[1] - left
+    return np.pad(strip, ((0, 0), (left, right), (0, 0)), constant_values=1.0)
+
+
+def _finished(panel: Panel) -> np.ndarray:
+    """A panel's picture with its inset, its legend and its frame."""
+    picture = display(panel.picture).copy()
+    h, w = picture.shape[:2]
+    room = max(4, round(0.025 * min(h, w)))
+    if panel.inset is not None:
+        inset = _framed(np.pad(display(panel.inset), ((3, 3), (3, 3), (0, 0)), constant_values=1.0))
+        ih, iw = inset.shape[:2]
+        if ih + 2 * room > h or iw + 2 * room > w:
+            raise ValueError(f"an inset of {iw} x {ih} does not fit into a panel of {w} x {h}")
+        picture[h - room - ih:h - room, room:room + iw] = inset
+    if panel.legend is not None:
+        s = len(panel.legend)
+        corner = picture[h - room - s:h - room, w - room - s:w - room]
+        cover = panel.legend[..., 3:]
+        corner[:] = corner * (1.0 - cover) + panel.legend[..., :3] * cover
+    return _framed(picture) if panel.frame else picture
+
+
+def _framed(picture: np.ndarray) -> np.ndarray:
+    picture[[0, -1]] = FRAME
+    picture[:, [0, -1]] = FRAME
+    return picture
+
+
+def _row(pictures: list[np.ndarray], labels: list[str], letter: int, gap: int) -> np.ndarray:
+    """One row of finished panels over their labels, (h, w, 3) display values."""
+    height = max(len(picture) for picture in pictures)
+    below = _line_height(letter) + round(0.45 * letter) if any(labels) else 0
+    columns = []
+    for picture, label in zip(pictures, labels, strict=True):
+        text = lettering(label, letter)
+        wide = max(picture.shape[1], text.shape[1])
+        column = np.ones((height + below, wide, 3), np.float32)
+        left = (wide - picture.shape[1]) // 2
+        column[height - len(picture):height, left:left + picture.shape[1]] = picture
+        if label:
+            left = (wide - text.shape[1]) // 2
+            top = height + below - len(text)
+            column[top:, left:left + text.shape[1]] -= (1.0 - INK) * np.minimum(text, 1.0)[..., None]
+        columns += [column, np.ones((height + below, gap, 3), np.float32)]
+    return np.concatenate(columns[:-1], axis=1)
