@@ -102,20 +102,18 @@ nb::tuple file_contents(const std::string &path) {
     return nb::make_tuple(grids, metadata ? texts_of(*metadata) : Texts());
 }
 
-// The grid's values from index `first` to `last`, both included; with an empty `last` the active voxels' box.
-// Returns (first index, values). More than `most` voxels raise, before memory is taken for them.
-nb::tuple grid_values(const std::string &path, const std::string &name, const std::vector<int> &first,
-                      const std::vector<int> &last, size_t most) {
+// The grid's values from index 0 up to `size` (x, y, z), or if active voxels lie outside, or `size` is empty, those of
+// the active voxels' box. Returns (first index, values). More than `most` voxels raise before memory is taken.
+nb::tuple grid_values(const std::string &path, const std::string &name, const std::vector<int> &size, size_t most) {
     openvdb::io::File file(path);
     file.open(/*delayLoad=*/false);
     const auto grid = file.readGrid(name);
-    openvdb::CoordBBox box;
-    if (last.empty()) {
-        box = grid->evalActiveVoxelBoundingBox();
-        if (box.empty()) throw std::runtime_error("grid '" + name + "' holds no active voxel");
+    openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
+    if (size.empty()) {
+        if (box.empty()) throw std::runtime_error("the grid holds no active voxel");
     } else {
-        box.reset(openvdb::Coord(first.at(0), first.at(1), first.at(2)),
-                  openvdb::Coord(last.at(0), last.at(1), last.at(2)));
+        const openvdb::CoordBBox whole({0, 0, 0}, {size.at(0) - 1, size.at(1) - 1, size.at(2) - 1});
+        if (box.empty() || whole.isInside(box)) box = whole;
     }
     const double voxels = [&] {  // in double: the indices of a damaged file overflow integers
         double product = 1;
@@ -123,11 +121,11 @@ nb::tuple grid_values(const std::string &path, const std::string &name, const st
         return product;
     }();
     if (!(voxels >= 1 && voxels <= double(most)))
-        throw std::runtime_error("grid '" + name + "' spans " + std::to_string(voxels) + " voxels");
+        throw std::runtime_error("the grid spans " + std::to_string(voxels) + " voxels");
     const std::vector<int> start = {box.min().x(), box.min().y(), box.min().z()};
     if (grid->isType<openvdb::FloatGrid>()) return nb::make_tuple(start, array_of<openvdb::FloatGrid>(grid, box));
     if (grid->isType<openvdb::Vec3SGrid>()) return nb::make_tuple(start, array_of<openvdb::Vec3SGrid>(grid, box));
-    throw std::runtime_error("grid '" + name + "' is of type " + grid->type());
+    throw std::runtime_error("the grid is of type " + grid->valueType());
 }
 
 NB_MODULE(_openvdb, m) {
@@ -137,5 +135,5 @@ NB_MODULE(_openvdb, m) {
     m.def("write", &write_file, nb::arg("path"), nb::arg("grids"), nb::arg("voxel_size"), nb::arg("origin"),
           nb::arg("metadata"), nb::arg("half"));
     m.def("contents", &file_contents, nb::arg("path"));
-    m.def("values", &grid_values, nb::arg("path"), nb::arg("name"), nb::arg("first"), nb::arg("last"), nb::arg("most"));
+    m.def("values", &grid_values, nb::arg("path"), nb::arg("name"), nb::arg("size"), nb::arg("most"));
 }

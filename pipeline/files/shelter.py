@@ -21,14 +21,14 @@ import numpy as np
 
 from pipeline.errors import BadInput
 
-MEMORY = 8 << 30  # bytes of address space
-SECONDS = 60.0  # and one more for each 10 MB of the file
+MEMORY = min(8 << 30, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2)  # bytes of address space
+SECONDS = 20.0  # and one more for each 10 MB of the file
 
 _CHILD = "from pipeline.files import shelter; shelter._answer()"
 
 
 def read(function: Callable[..., dict[str, Any]], path: Path, key: str, *arguments: Any,
-         memory: int = MEMORY, seconds: float = SECONDS) -> dict[str, Any]:
+         memory: int | None = None, seconds: float | None = None) -> dict[str, Any]:
     """`function(path, *arguments)`, called in a child process.
 
     `function` stands at the top level of its module and returns a dict of arrays and JSON values; arguments are JSON
@@ -40,13 +40,13 @@ def read(function: Callable[..., dict[str, Any]], path: Path, key: str, *argumen
         "function": f"{function.__module__}:{function.__qualname__}",
         "path": str(path.resolve()),
         "arguments": arguments,
-        "memory": memory,
+        "memory": memory or MEMORY,
     }
-    seconds += path.stat().st_size / 10e6
+    seconds = (seconds or SECONDS) + path.stat().st_size / 10e6
     # one thread: each takes address space, and on a big machine they would use up the limit between them
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "2"}
     try:
-        child = subprocess.run([sys.executable, "-I", "-c", _CHILD], input=json.dumps(task).encode(), cwd="/",
+        child = subprocess.run([sys.executable, "-P", "-c", _CHILD], input=json.dumps(task).encode(), cwd="/",
                                env=environment, capture_output=True, timeout=seconds, check=False)
     except subprocess.TimeoutExpired:
         raise BadInput(path, key, f"damaged: not read within {seconds:.0f} s") from None
@@ -89,9 +89,9 @@ def _answer() -> None:
         result = getattr(importlib.import_module(module), name)(Path(task["path"]), *task["arguments"])
     except MemoryError:
         out.write(json.dumps({"error": f"needs more than {task['memory'] >> 20} MiB to read"}).encode() + b"\n")
-    except Exception as error:  # whatever a library makes of a damaged file
+    except Exception as error:  # ValueError is our own verdict; a library may raise anything at a damaged file
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        out.write(json.dumps({"error": reason}).encode() + b"\n")
+        out.write(json.dumps({"error": reason if type(error) is ValueError else f"damaged: {reason}"}).encode() + b"\n")
     else:
         arrays = {name: np.ascontiguousarray(v) for name, v in result.items() if isinstance(v, np.ndarray)}
         values = {name: v for name, v in result.items() if name not in arrays}

@@ -22,6 +22,7 @@ from pipeline.files import atomic, shelter
 from synth.field import Field
 
 SHAPE = "flowloom_shape"  # grid metadata: cells along x, y, z
+VOXEL_SIZE = "flowloom_voxel_size"  # grid metadata: OpenVDB changes the last bit when it reads a transform
 MOST_VOXELS = 1024**3
 _UUID = slice(21, 57)  # where the header holds a random name of the file
 
@@ -47,7 +48,8 @@ def write(path: Path, fields: Mapping[str, Field], *, metadata: Mapping[str, str
     from pipeline.files import _openvdb
 
     shape = " ".join(str(n) for n in reversed(first.shape))
-    grids = [(name, field.values, {SHAPE: shape}) for name, field in fields.items()]
+    about = {SHAPE: shape, VOXEL_SIZE: repr(first.voxel_size)}
+    grids = [(name, field.values, about) for name, field in fields.items()]
     with atomic.replacing(path) as temporary:
         try:
             _openvdb.write(str(temporary), grids, first.voxel_size, list(first.origin), dict(metadata or {}), half)
@@ -140,10 +142,12 @@ def _values(path: Path, grid: dict[str, Any]) -> dict[str, Any]:
     if grid["staggered"]:
         raise ValueError("a staggered velocity; convert it to one with all components at the voxel's centre")
     voxel_size, origin = _placement(grid["matrix"])
-    first, last = [], []
-    if SHAPE in grid["metadata"]:
-        first, last = [0, 0, 0], [int(n) - 1 for n in grid["metadata"][SHAPE].split()]
-    first, values = _openvdb.values(str(path), grid["name"], first, last, MOST_VOXELS)
+    about = grid["metadata"]
+    size = [int(n) for n in about.get(SHAPE, "").split()]
+    stored = float(about.get(VOXEL_SIZE, "nan"))
+    if abs(stored - voxel_size) < 1e-9 * voxel_size:  # not so where somebody scaled the grid and kept our metadata
+        voxel_size = stored
+    first, values = _openvdb.values(str(path), grid["name"], size, MOST_VOXELS)
     corner = [o + voxel_size * i for o, i in zip(origin, first, strict=True)]
     return {"values": values, "voxel_size": voxel_size, "origin": corner}
 
