@@ -38,10 +38,10 @@ class Panel:
 
 
 def display(picture: np.ndarray) -> np.ndarray:
-    """A panel's picture (h, w, 3) as float32 display values in [0, 1]."""
+    """A panel's picture (h, w, 3) as a new array of float32 display values in [0, 1]."""
     if picture.ndim != 3 or picture.shape[2] != 3:
         raise ValueError(f"expected a picture (h, w, 3), got {picture.shape}")
-    return picture.astype(np.float32) / 255.0 if picture.dtype == np.uint8 else picture.astype(np.float32)
+    return picture.astype(np.float32) / (255.0 if picture.dtype == np.uint8 else 1.0)
 
 
 def fitted(picture: np.ndarray, width: int) -> np.ndarray:
@@ -148,7 +148,7 @@ def figure(rows: Sequence[Sequence[Panel]], *, letter: int = 26, gap: int = 20,
     for strip in padded[1:]:
         spaced += [np.ones((gap, width, 3), np.float32), strip]
     sheet = np.pad(np.concatenate(spaced), ((margin, margin), (margin, margin), (0, 0)), constant_values=1.0)
-    return film.eight_bit(sheet)
+    return np.rint(sheet * 255.0).astype(np.uint8)
 
 
 def _centred(strip: np.ndarray, width: int) -> np.ndarray:
@@ -159,7 +159,7 @@ def _centred(strip: np.ndarray, width: int) -> np.ndarray:
 
 def _finished(panel: Panel) -> np.ndarray:
     """A panel's picture with its inset, its legend and its frame."""
-    picture = display(panel.picture).copy()
+    picture = display(_eight_bit(panel.picture))
     h, w = picture.shape[:2]
     room = max(4, round(0.025 * min(h, w)))
     if panel.inset is not None:
@@ -174,6 +174,11 @@ def _finished(panel: Panel) -> np.ndarray:
         cover = panel.legend[..., 3:]
         corner[:] = corner * (1.0 - cover) + panel.legend[..., :3] * cover
     return _framed(picture) if panel.frame else picture
+
+
+def _eight_bit(picture: np.ndarray) -> np.ndarray:
+    """Bytes as they are; float values dithered, here and not at the end, so that bytes keep their value."""
+    return picture if picture.dtype == np.uint8 else film.eight_bit(picture)
 
 
 def _framed(picture: np.ndarray) -> np.ndarray:

@@ -103,6 +103,6 @@ def bowl(radius: float, height: float) -> Mesh:
     outer = radius + wall
     foot = [(0.0, 0.0), (0.60 * outer, 0.0), (0.62 * outer, 0.06 * height)]
     side = _arc((0.58 * outer, height - 0.5 * wall), (0.42 * outer, 0.88 * height - 0.5 * wall), -90.0, 0.0)
-    lip = _arc((radius + 0.5 * wall, height - 0.5 * wall), (0.5 * wall, 0.5 * wall), 0.0, 180.0, 12)
+    lip = _arc((radius + 0.5 * wall, height - 0.5 * wall), (0.5 * wall, 0.5 * wall), 0.0, 180.0, 13)
     inside = _arc((0.0, height - 0.5 * wall), (radius, 0.72 * height - 0.5 * wall), 0.0, -90.0, 24)
     return revolved(np.concatenate([foot, side, lip[1:], inside[1:]]))

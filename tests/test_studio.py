@@ -1,0 +1,47 @@
+"""render.studio: meshes that are closed where they should be and stand where they should."""
+
+import numpy as np
+
+from render import studio
+
+
+def edges(mesh: studio.Mesh) -> dict[tuple[int, int], int]:
+    """How often each directed edge occurs among the faces that have an area."""
+    count: dict[tuple[int, int], int] = {}
+    for face in mesh.faces.tolist():
+        for a, b in zip(face, face[1:] + face[:1], strict=True):
+            count[a, b] = count.get((a, b), 0) + 1
+    return count
+
+
+def test_each_edge_is_used_once_each_way_round() -> None:
+    """One orientation all over: no directed edge is used twice."""
+    for mesh in (studio.bowl(0.2, 0.1), studio.backdrop()):
+        assert max(edges(mesh).values()) == 1
+
+
+def test_the_bowl_holds_a_positive_volume_and_stands_on_the_floor() -> None:
+    """Faces look outwards: the signed volume is the stone's, less than the cylinder round it."""
+    bowl = studio.bowl(0.2, 0.1)
+    a, b, c = (bowl.vertices[bowl.faces[:, k]].astype(np.float64) for k in range(3))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0
+    assert 0.1 * np.pi * 0.232**2 * 0.1 < volume < np.pi * 0.232**2 * 0.1
+    assert bowl.vertices[:, 1].min() == 0.0
+    assert np.isclose(bowl.vertices[:, 1].max(), 0.1, atol=1e-6)
+
+
+def test_the_bowl_is_open_and_as_wide_as_asked() -> None:
+    bowl = studio.bowl(0.2, 0.1)
+    radius = np.hypot(bowl.vertices[:, 0], bowl.vertices[:, 2])
+    near_rim = np.abs(bowl.vertices[:, 1] - 0.084) < 0.005  # where the lip ends and the inside begins
+    assert np.isclose(radius[near_rim].min(), 0.2, atol=1e-3)
+
+
+def test_the_backdrop_is_smooth_and_its_floor_is_at_zero() -> None:
+    """No horizon: from floor to wall the slope turns by less than 3 degrees at a time."""
+    backdrop = studio.backdrop()
+    profile = backdrop.vertices[:len(backdrop.vertices) // 2, 1:].astype(np.float64)
+    steps = np.diff(profile, axis=0)
+    angle = np.degrees(np.unwrap(np.arctan2(steps[:, 0], -steps[:, 1])))
+    assert np.abs(np.diff(angle)).max() < 3.0
+    assert backdrop.vertices[:, 1].min() == 0.0
