@@ -1,8 +1,8 @@
 """Semi-Lagrangian advection [Stam 1999], in 2-D and 3-D, of scalars and vectors.
 
-`advect` runs on the OpenCL device; `advect_reference` is its specification in NumPy, equal bit for bit. A step
-is split in two, so that one backtrace can serve many quantities: `departure` finds where the content of each
-cell comes from, and the gather interpolates there.
+`advect` runs on the OpenCL device; `advect_reference` is its specification in NumPy, equal bit for bit. A
+step is split in two, so that one backtrace can serve many quantities: `departure` finds where the content of
+each cell comes from, and the gather interpolates there.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def advect(q: np.ndarray, v: np.ndarray, dt: float = 1.0, border: str = "clamp")
 
 
 def velocity_field(v: np.ndarray) -> np.ndarray:
-    """`v` as contiguous float32 (Y, X, 2) or (Z, Y, X, 3); ValueError for other shapes, NaN, over 2^20 cells."""
+    """`v` as contiguous float32 (Y, X, 2) or (Z, Y, X, 3); ValueError for another shape, NaN, wild speed."""
     v = np.ascontiguousarray(v, dtype=np.float32)
     if v.ndim not in (3, 4) or v.shape[-1] != v.ndim - 1 or v.size == 0:
         raise ValueError(f"a velocity field is (Y, X, 2) or (Z, Y, X, 3), not {v.shape}")
@@ -101,9 +101,9 @@ class Grid:
 
 def departure_reference(v: np.ndarray, dt: float = 1.0, border: str = "clamp") -> np.ndarray:
     """`departure` in NumPy: d = -dt v(x - dt/2 v(x))."""
-    dt = np.float32(dt)
-    half_way = np.float32(-0.5) * dt * v
-    return -dt * _at(v, half_way, "clamp" if border == "zero" else border)
+    step = np.float32(dt)
+    half_way = np.float32(-0.5) * step * v
+    return -step * _at(v, half_way, "clamp" if border == "zero" else border)
 
 
 def advect_reference(q: np.ndarray, v: np.ndarray, dt: float = 1.0, border: str = "clamp") -> np.ndarray:
