@@ -1,0 +1,63 @@
+"""PLY files: triangle meshes in world units, as arrays. The one home of trimesh's reading and writing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import BadInput, StorageFailed
+from pipeline.files import atomic, shelter
+
+
+def write(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
+    """Write vertices (N, 3) float32, world units, and triangles (M, 3) of indices into them, as binary PLY.
+
+    Raises ValueError for other shapes, NaN or infinity, or an index that is no vertex; `StorageFailed` if the file
+    does not read back.
+    """
+    import trimesh
+
+    _require_mesh(vertices, faces)
+    mesh = trimesh.Trimesh(vertices.astype(np.float32), faces.astype(np.int32), process=False)
+    with atomic.replacing(path) as temporary:
+        temporary.write_bytes(mesh.export(file_type="ply", vertex_normal=False))
+        try:
+            back = _parsed(temporary)
+        except Exception as error:  # trimesh raises anything at a file cut short
+            raise StorageFailed(path, f"did not read back ({error}); is the disk full?") from error
+        same = np.array_equal(back["vertices"], vertices.astype(np.float32)) and np.array_equal(back["faces"], faces)
+        if not same:
+            raise StorageFailed(path, "did not read back as it was written; is the disk full?")
+
+
+def _require_mesh(vertices: np.ndarray, faces: np.ndarray) -> None:
+    for name, array in (("vertices", vertices), ("faces", faces)):
+        if array.ndim != 2 or array.shape[1] != 3 or not len(array):
+            raise ValueError(f"{name} have shape (n, 3) with n > 0, not {array.shape}")
+    if not np.isfinite(vertices).all():
+        raise ValueError("the vertices hold NaN or infinity")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise ValueError(f"a face names a vertex that does not exist (0 to {len(vertices) - 1})")
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    import trimesh
+
+    with path.open("rb") as file:
+        mesh = trimesh.load_mesh(file, file_type="ply", process=False)
+    return {"vertices": np.asarray(mesh.vertices, np.float32), "faces": np.asarray(mesh.faces, np.int32)}
+
+
+def read(path: Path, key: str) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (N, 3) float32 and triangles (M, 3) int32 of anybody's PLY file, read in a child process.
+
+    `key` is the scene's, for the error. Raises `BadInput` if the file is missing or damaged or holds no mesh.
+    """
+    found = shelter.read(_parsed, path, key)
+    try:
+        _require_mesh(found["vertices"], found["faces"])
+    except ValueError as error:
+        raise BadInput(path, key, str(error)) from error
+    return found["vertices"], found["faces"]

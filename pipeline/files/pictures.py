@@ -1,0 +1,144 @@
+"""8-bit PNG files, and what OpenImageIO does with pictures: resize, FLIP.
+
+A picture is (h, w, 3), top row first, sRGB. Grey values that become a field are (Y, X), lowest row first.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import BadInput, StorageFailed
+from pipeline.files import atomic, shelter
+
+LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709, of sRGB values
+LARGEST = 16384  # pixels along a side of a stranger's picture
+
+
+def write(path: Path, picture: np.ndarray) -> None:
+    """Write an sRGB picture (h, w, 3) or (h, w), uint8 or floats from 0 to 1 (clipped, rounded), as 8-bit PNG.
+
+    Raises ValueError for another shape, NaN or infinity; `StorageFailed` if it does not read back.
+    """
+    pixels = as_bytes(picture)
+    import OpenImageIO as oiio
+
+    height, width = pixels.shape[:2]
+    spec = oiio.ImageSpec(width, height, 1 if pixels.ndim == 2 else 3, "uint8")
+    spec.attribute("oiio:ColorSpace", "srgb_rec709_scene")
+    with atomic.replacing(path) as temporary:
+        out = oiio.ImageOutput.create("png")
+        done = out.open(str(temporary), spec) and out.write_image(pixels.reshape(height, width, -1)) and out.close()
+        if not done:
+            raise StorageFailed(path, f"PNG: {_first_line(out.geterror())}; is the disk full?")
+        try:
+            back = _pixels(temporary)["pixels"]
+        except ValueError as error:
+            raise StorageFailed(path, f"did not read back ({error}); is the disk full?") from error
+        if not np.array_equal(back.reshape(pixels.shape), pixels):
+            raise StorageFailed(path, "did not read back as it was written; is the disk full?")
+
+
+def as_bytes(picture: np.ndarray) -> np.ndarray:
+    """The 8-bit pixels of a picture (h, w[, 3]): uint8 as they are, floats from 0 to 1 clipped and rounded."""
+    if not (picture.ndim == 2 or (picture.ndim == 3 and picture.shape[2] == 3)) or 0 in picture.shape:
+        raise ValueError(f"a picture has shape (h, w) or (h, w, 3), not {picture.shape}")
+    if picture.dtype == np.uint8:
+        return np.ascontiguousarray(picture)
+    if not np.isfinite(picture).all():
+        raise ValueError("the picture holds NaN or infinity")
+    return np.ascontiguousarray(np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8))
+
+
+def _first_line(text: str) -> str:
+    return text.strip().splitlines()[0] if text.strip() else "no reason given"
+
+
+def _pixels(path: Path) -> dict[str, Any]:
+    """The pixels (h, w, channels) as stored, in uint8 or uint16; ValueError if not all of them are there."""
+    import OpenImageIO as oiio
+
+    hints = oiio.ImageSpec()
+    hints.attribute("oiio:UnassociatedAlpha", 1)  # the stored colours, not multiplied by their alpha
+    source = oiio.ImageInput.open(str(path), hints)
+    if source is None:
+        raise ValueError(f"no picture ({_first_line(oiio.geterror())})")
+    spec = source.spec()
+    if max(spec.width, spec.height) > LARGEST:
+        raise ValueError(f"{spec.width} x {spec.height} pixels; the largest side read is {LARGEST}")
+    pixels = source.read_image("uint16" if spec.format.basetype == oiio.UINT16 else "uint8")
+    error = source.geterror()
+    source.close()
+    if pixels is None or error:
+        raise ValueError(f"damaged or cut short ({_first_line(error)})")
+    return {"pixels": np.asarray(pixels)}
+
+
+def read(path: Path) -> np.ndarray:
+    """The sRGB picture (h, w, 3) float32, 0 to 1, of a PNG file. Raises `BadInput` if it is missing or damaged.
+
+    Reads in this process; for files of our own.
+    """
+    if not path.is_file():
+        raise BadInput(path, "", "no such file")
+    try:
+        return _picture(_pixels(path)["pixels"])
+    except ValueError as error:
+        raise BadInput(path, "", str(error)) from error
+
+
+def read_foreign(path: Path, key: str) -> np.ndarray:
+    """The sRGB picture (h, w, 3) float32, 0 to 1, of anybody's PNG, JPEG or TIFF, on white where it is transparent.
+
+    Read in a child process; `key` is the scene's, for the error. Raises `BadInput` if it is missing, damaged or cut
+    short.
+    """
+    try:
+        return _picture(shelter.read(_pixels, path, key)["pixels"])
+    except ValueError as error:
+        raise BadInput(path, key, str(error)) from error
+
+
+def read_grey(path: Path, key: str) -> np.ndarray:
+    """The grey values (Y, X) float32, 0 to 1, lowest row first, of anybody's picture. Raises as `read_foreign`."""
+    return np.ascontiguousarray((read_foreign(path, key) @ LUMA)[::-1])
+
+
+def _picture(stored: np.ndarray) -> np.ndarray:
+    """(h, w, 3) float32 from 0 to 1 of stored pixels: grey, colour, each with or without alpha."""
+    pixels = stored.astype(np.float32) / np.float32(np.iinfo(stored.dtype).max)
+    channels = pixels.shape[2]
+    if channels > 4:
+        raise ValueError(f"{channels} channels; a picture has 1 to 4")
+    if channels in (2, 4):
+        alpha = pixels[..., -1:]
+        pixels = pixels[..., :-1] * alpha + (1 - alpha)
+    return np.ascontiguousarray(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
+
+
+def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:
+    """The picture (h, w, 3) resampled to (height, width, 3) float32: blackman-harris growing, lanczos3 shrinking."""
+    import OpenImageIO as oiio
+
+    source = oiio.ImageBuf(np.ascontiguousarray(picture, dtype=np.float32))
+    result = oiio.ImageBufAlgo.resize(source, "", 0.0, roi=oiio.ROI(0, width, 0, height, 0, 1, 0, picture.shape[2]))
+    if result.has_error:
+        raise ValueError(f"cannot resize: {_first_line(result.geterror())}")
+    return np.asarray(result.get_pixels("float")).reshape(height, width, -1)
+
+
+def flip(reference: np.ndarray, test: np.ndarray) -> np.ndarray:
+    """The perceived difference (h, w) float32, 0 to 1, of two sRGB pictures (h, w, 3): FLIP at 67 pixels a degree."""
+    import OpenImageIO as oiio
+
+    linear = [oiio.ImageBuf(np.ascontiguousarray(_linear(p), dtype=np.float32)) for p in (reference, test)]
+    result = oiio.ImageBufAlgo.FLIP_diff(*linear, hdr=0, ppd=67.0)
+    if result.has_error:
+        raise ValueError(f"FLIP: {_first_line(result.geterror())}")
+    return np.asarray(result.get_pixels("float")).reshape(*reference.shape[:2], -1)[..., 0]
+
+
+def _linear(srgb: np.ndarray) -> np.ndarray:
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
