@@ -1,0 +1,130 @@
+"""Whether a scene still gives what its reference keeps (`flowloom diff`).
+
+First the fields and volumes by content: the sums of every frame, all values of the frame that the figure
+shows. Then a small proof of that frame at the scene's seed. Content comes first because pictures forgive: one
+per cent more smoke is far below what a threshold on the mean FLIP notices.
+
+A difference that is meant becomes the new reference by `flowloom references`; look at the report before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline import references, stages
+from pipeline.files import images
+from pipeline.progress import Progress
+
+SUM_TOLERANCE = 1e-6  # of a frame's sums, relative to the sum of its absolute values
+VALUE_TOLERANCE = 1e-5  # of any value, relative to the frame's largest
+PIXEL_TOLERANCE = 1e-3  # of a pixel, relative to its reference
+PIXEL_FLOOR = 1e-2  # a pixel darker than this share of the picture's mean counts as that bright
+PIXEL_SHARE = 1e-3  # of the pixels may differ by more: another SIMD width changes up to 2 of 9,216
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The outcome of one comparison.
+
+    fault: what differs, "" if nothing; measured: how far apart they are, either way; old, new: the arrays
+    compared, where there is something to look at; is_light: whether they are linear light.
+    """
+
+    name: str
+    fault: str
+    measured: str = ""
+    old: np.ndarray | None = None
+    new: np.ndarray | None = None
+    is_light: bool = False
+
+
+def compared_sums(name: str, new: dict[str, Any], old: dict[str, Any]) -> Finding:
+    """Whether two frames, given by `references.sums`, have the same shape and the same sums."""
+    if new["shape"] != old["shape"]:
+        return Finding(name, f"its shape is {new['shape']}, was {old['shape']}")
+    scale = max(old["absolute"], float(np.finfo(np.float64).tiny))
+    worst = max(abs(new[key] - old[key]) for key in ("sum", "absolute")) / scale
+    measured = f"sums {worst:.2g} apart"
+    return Finding(name, "" if worst <= SUM_TOLERANCE else f"{measured}, {SUM_TOLERANCE:g} may be", measured)
+
+
+def compared_values(name: str, new: np.ndarray, old: np.ndarray) -> Finding:
+    """Whether two fields or volumes have the same shape, the same sums and the same values."""
+    overall = compared_sums(name, references.sums(new), references.sums(old))
+    if new.shape != old.shape:
+        return replace(overall, old=old, new=new)
+    scale = max(float(np.abs(old).max()), float(np.finfo(np.float32).tiny))
+    worst = float(np.abs(new.astype(np.float64) - old).max()) / scale
+    measured = f"largest difference {worst:.2g} of the largest value"
+    fault = "" if worst <= VALUE_TOLERANCE else f"{measured}, {VALUE_TOLERANCE:g} may be"
+    both = [part for part in (overall.fault, fault) if part]
+    return Finding(name, "; ".join(both), f"{overall.measured}; {measured}", old, new)
+
+
+def compared_light(name: str, new: np.ndarray, old: np.ndarray) -> Finding:
+    """Whether two pictures (h, w, 3) of linear light have the same pixels, all but PIXEL_SHARE of them."""
+    if new.shape != old.shape:
+        fault = f"its shape is {list(new.shape)}, was {list(old.shape)}"
+        return Finding(name, fault, "", old, new, is_light=True)
+    floor = max(PIXEL_FLOOR * float(old.mean()), float(np.finfo(np.float32).tiny))
+    relative = np.abs(new.astype(np.float64) - old) / np.maximum(np.abs(old), floor)
+    differs = ~(relative <= PIXEL_TOLERANCE).all(axis=-1)  # not >: a pixel that is no number differs
+    share = float(differs.mean())
+    measured = f"{share:.2%} of the pixels differ by more than {PIXEL_TOLERANCE:g}"
+    fault = "" if share <= PIXEL_SHARE else f"{measured}, {PIXEL_SHARE:.1%} may"
+    return Finding(name, fault, measured, old, new, is_light=True)
+
+
+def check(scene_file: Path, out: Path, progress: Progress) -> list[str]:
+    """Run a scene at its [quick] settings and compare; one line per difference, none if it is the same.
+
+    Writes the report out/quick/X/diff/index.html with its picture. Raises BadInput if there is no reference,
+    and what the stages raise.
+    """
+    from pipeline import evidence
+
+    record = references.record_of(scene_file)
+    works = references.baked(scene_file, out, progress)
+    found = list(findings(works, references.folder_of(scene_file), record))
+    page = evidence.write(scene_file.stem, found, works.root / "diff")
+    lines = [f"{scene_file.stem}: {finding.name}: {finding.fault}" for finding in found if finding.fault]
+    if lines:
+        meant = f"if it is meant, type: flowloom references {scene_file}"
+        lines.append(f"{scene_file.stem}: look at {page}; {meant}")
+    return lines
+
+
+def findings(works: stages.Works, folder: Path, record: dict[str, Any]) -> Iterator[Finding]:
+    """All comparisons with the reference in `folder`: content first, then the proofs."""
+    left = {**record["sums"], **record["proofs"]}
+    for made in references.contents(works):
+        old = left.pop(made.path, None)
+        if old is None:
+            yield Finding(made.path, "is new; the reference does not have it")
+        elif made.path in record["files"]:
+            yield compared_values(made.path, made.values(made.file), made.values(folder / made.path))
+        else:
+            yield compared_sums(made.path, references.sums(made.values(made.file)), old)
+    for proof in references.proofs(works):
+        old = left.pop(proof.path, None)
+        if old is None:
+            yield Finding(proof.path, "is new; the reference does not have it")
+            continue
+        finding = compared_light(proof.path, proof.light, images.read_picture(folder / proof.path))
+        since = _changes(proof.made_with, old)
+        if finding.fault and since:
+            finding = replace(finding, fault=f"{finding.fault} (since then {since})")
+        yield finding
+    for path in left:
+        yield Finding(path, "is no longer made; the reference has it")
+
+
+def _changes(new: dict[str, str], old: dict[str, str]) -> str:
+    """Which versions are not those of the reference, "" if none."""
+    names = [name for name in {**old, **new} if new.get(name) != old.get(name)]
+    return ", ".join(f"{name} {old.get(name, 'none')} became {new.get(name, 'none')}" for name in names)

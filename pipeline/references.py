@@ -1,0 +1,195 @@
+"""What a scene gives at its [quick] settings, and the reference that keeps it (`flowloom references`).
+
+A reference is a folder tests/references/<scene>/, or references/<scene>/ beside a scene that is not the
+project's. It holds the frame that the figure shows of every product of synth and bake, as the stages write
+it; a small proof of that frame, `proof.exr`, for each different picture; and `reference.json`, written last:
+the sums of every frame, the SHA-256 of each file, and the versions that rendered the proofs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline import stages
+from pipeline.errors import BadInput
+from pipeline.files import atomic, images
+from pipeline.progress import Progress
+from pipeline.scene import load
+from pipeline.schema import PROJECT_SCENES, Scene
+
+RECORD = "reference.json"
+PROOF = "proof.exr"
+PROOF_WIDTH, PROOF_SAMPLES = 96, 8
+
+
+@dataclass(frozen=True)
+class Made:
+    """A file of fields or geometry: its path under the scene's output root, and where and how to read it."""
+
+    path: str
+    file: Path
+    works: stages.Works
+    variant: str
+    product: str
+    is_shown: bool
+
+    def values(self, file: Path) -> np.ndarray:
+        """The values of `file`, which is this one or its reference."""
+        return _read(self.works, self.variant, self.product, file)
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A small picture of a variant's shown frame: linear light (h, w, 3), and what versions rendered it."""
+
+    path: str
+    light: np.ndarray
+    made_with: dict[str, str]
+
+
+def baked(scene_file: Path, out: Path, progress: Progress) -> stages.Works:
+    """The scene's works with all of synth and bake made, at its [quick] settings."""
+    scenes = load(scene_file, quick=True)
+    stages.run("bake", scenes, out, progress)
+    return stages.Works(scenes, out)
+
+
+def shown_frame(scene: Scene) -> int:
+    """The frame of the still."""
+    return scene.figure.frame or scene.frames
+
+
+def contents(works: stages.Works) -> Iterator[Made]:
+    """Every file of fields and geometry, each once however many variants share it."""
+    seen: set[Path] = set()
+    for variant, products in works.products.items():
+        scene = works.scenes.variants[variant]
+        for product in products.values():
+            if product.stage not in ("synth", "bake"):
+                continue
+            for frame in product.frames(scene):
+                file = works.file(variant, product.name, frame)
+                if file not in seen:
+                    seen.add(file)
+                    path = file.relative_to(works.root).as_posix()
+                    yield Made(path, file, works, variant, product.name, frame in (0, shown_frame(scene)))
+
+
+def proofs(works: stages.Works) -> Iterator[Proof]:
+    """One proof for each different picture among the variants; none of a scene that renders no smoke."""
+    for variant in works.makers("beauty"):
+        scene = works.scenes.variants[variant]
+        small = {"width": PROOF_WIDTH, "spp": PROOF_SAMPLES}
+        render = scene.render.model_copy(update={k: v for k, v in small.items() if hasattr(scene.render, k)})
+        product, frame = works.products[variant]["beauty"], shown_frame(scene)
+        made = product.make(scene.model_copy(update={"render": render}), _Stock(works, variant), [frame])
+        folder = works.file(variant, "beauty", frame).parent.relative_to(works.root)
+        light = np.asarray(next(made)[1], np.float32)
+        yield Proof((folder / PROOF).as_posix(), light, made_with(render.kind))
+
+
+class _Stock:
+    """product.Stock for a proof, which is made in memory from whole files."""
+
+    def __init__(self, works: stages.Works, variant: str):
+        self._works, self._variant = works, variant
+
+    def read(self, product: str, frame: int = 0) -> Any:
+        scene, made = self._works.scenes.variants[self._variant], self._works.products[self._variant]
+        return made[product].read(self._works.file(self._variant, product, frame), scene)
+
+    def own(self, frame: int) -> Any | None:
+        return None
+
+    @property
+    def work(self) -> Path:
+        raise NotImplementedError("a proof is one frame: there is nothing to go on from")
+
+
+def _read(works: stages.Works, variant: str, product: str, file: Path) -> np.ndarray:
+    value = works.products[variant][product].read(file, works.scenes.variants[variant])
+    return np.asarray(getattr(value, "values", value))
+
+
+def made_with(kind: str) -> dict[str, str]:
+    """The versions that a picture of this [render] kind depends on."""
+    if kind == "volume":
+        from render import backend
+
+        return backend.versions("scalar_rgb")
+    return {name: importlib.metadata.version(name) for name in ("numpy", "scipy")}
+
+
+def sums(values: np.ndarray) -> dict[str, Any]:
+    """What is kept of every frame: shape, sum, and sum of absolute values, added in double precision."""
+    exact = values.astype(np.float64)
+    return {"shape": list(values.shape), "sum": float(exact.sum()), "absolute": float(np.abs(exact).sum())}
+
+
+def folder_of(scene_file: Path) -> Path:
+    """Where a scene's reference is kept."""
+    home = scene_file.resolve().parent
+    if home == PROJECT_SCENES:
+        home = PROJECT_SCENES.parent / "tests"
+    return home / "references" / scene_file.stem
+
+
+def write(scene_file: Path, out: Path, progress: Progress) -> str:
+    """Run a scene at its [quick] settings and keep what it gives; returns one line for the user.
+
+    A reference that would be the same to the bit stays untouched. Raises what the stages raise.
+    """
+    works = baked(scene_file, out, progress)
+    folder = folder_of(scene_file)
+    record: dict[str, Any] = {"scene": scene_file.stem, "sums": {}, "proofs": {}, "files": {}}
+    kept: dict[str, bytes] = {}
+    for made in contents(works):
+        record["sums"][made.path] = sums(made.values(made.file))
+        if made.is_shown:
+            kept[made.path] = made.file.read_bytes()
+    for proof in proofs(works):
+        record["proofs"][proof.path] = proof.made_with
+        draft = works.root / "diff" / proof.path
+        images.write_picture(draft, proof.light)
+        kept[proof.path] = draft.read_bytes()
+    record["files"] = {path: hashlib.sha256(content).hexdigest() for path, content in kept.items()}
+    text = json.dumps(record, indent=1) + "\n"
+    if (folder / RECORD).is_file() and (folder / RECORD).read_text() == text:
+        return f"{scene_file.stem}: unchanged"
+    for path, content in kept.items():
+        atomic.write_bytes(folder / path, content)
+    atomic.write_text(folder / RECORD, text)
+    for file in folder.rglob("*"):
+        if file.is_file() and file.relative_to(folder).as_posix() not in {RECORD, *kept}:
+            file.unlink()
+    megabytes = sum(map(len, kept.values())) / 1e6
+    return f"{scene_file.stem}: {len(kept)} files, {megabytes:.1f} MB, kept in {folder}"
+
+
+def record_of(scene_file: Path) -> dict[str, Any]:
+    """The record of a scene's reference, its files checked; BadInput if there is none or it is damaged."""
+    folder = folder_of(scene_file)
+    mending = f"type: flowloom references {scene_file}"
+    try:
+        record: dict[str, Any] = json.loads((folder / RECORD).read_text())
+        damaged = [path for path, sha256 in record["files"].items() if sha256 != _sha256(folder / path)]
+    except FileNotFoundError as error:
+        missing = Path(error.filename).relative_to(folder)
+        raise BadInput(scene_file, "", f"has no reference ({missing} is missing); {mending}") from None
+    except (ValueError, KeyError, AttributeError, TypeError) as error:
+        raise BadInput(folder / RECORD, "", f"is damaged; check it out anew, or {mending}") from error
+    if damaged:
+        raise BadInput(folder / damaged[0], "", f"is damaged; check it out anew, or {mending}")
+    return record
+
+
+def _sha256(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
