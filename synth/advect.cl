@@ -88,24 +88,29 @@ kernel void departure(global const float *restrict velocities, global float *res
     JOIN(vstore, DIMS)(-dt * middle, cell, displacements);
 }
 
-// out(x) = q(x + d(x)), linearly interpolated; q and out are (cells, CHANNELS), d is (cells, DIMS).
-kernel void advect(global const float *restrict q, global const float *restrict displacements,
-                   global float *restrict out, const int X, const int Y, const int Z)
+// q(x + d(x)), linearly interpolated; q is (cells, CHANNELS), d is (cells, DIMS).
+inline quantity at_departure(global const float *restrict q, global const float *restrict displacements,
+                             const int x, const int y, const int z, const int X, const int Y, const int Z)
 {
-    const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
-    if (x >= X) return;
-    const int cell = (z * Y + y) * X + x;
-    const velocity d = LOAD_VELOCITY(cell, displacements);
+    const velocity d = LOAD_VELOCITY((z * Y + y) * X + x, displacements);
     SPLIT(i, u, x, d.x);
     SPLIT(j, v, y, d.y);
 #if DIMS == 3
     SPLIT(k, w, z, d.z);
     const bool interior = i >= 0 & i < X - 1 & j >= 0 & j < Y - 1 & k >= 0 & k < Z - 1;
-    const quantity value = interior ? LERP(SQUARE(NEAR, k), SQUARE(NEAR, k + 1), w)
-                                    : LERP(SQUARE(CORNER, k), SQUARE(CORNER, k + 1), w);
+    return interior ? LERP(SQUARE(NEAR, k), SQUARE(NEAR, k + 1), w)
+                    : LERP(SQUARE(CORNER, k), SQUARE(CORNER, k + 1), w);
 #else
     const bool interior = i >= 0 & i < X - 1 & j >= 0 & j < Y - 1;
-    const quantity value = interior ? SQUARE(NEAR, z) : SQUARE(CORNER, z);
+    return interior ? SQUARE(NEAR, z) : SQUARE(CORNER, z);
 #endif
-    STORE(value, cell, out);
+}
+
+// One step: out = q carried along d.
+kernel void advect(global const float *restrict q, global const float *restrict displacements,
+                   global float *restrict out, const int X, const int Y, const int Z)
+{
+    const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
+    if (x >= X) return;
+    STORE(at_departure(q, displacements, x, y, z, X, Y, Z), (z * Y + y) * X + x, out);
 }

@@ -75,8 +75,8 @@ class Grid:
             raise ValueError(f"border {border!r} is none of {', '.join(BORDERS)}")
         self.shape, self.border = shape, border
         x, y, z = shape[-1], shape[-2], shape[0] if len(shape) == 3 else 1
-        self._cells = tuple(np.int32(n) for n in (x, y, z))
-        self._global = (-(-x // ROW) * ROW, y, z)
+        self.cells = tuple(np.int32(n) for n in (x, y, z))
+        self.work = (-(-x // ROW) * ROW, y, z)
 
     def _program(self, channels: int) -> opencl.Program:
         return opencl.program(Path(__file__).with_suffix(".cl"), DIMS=len(self.shape), CHANNELS=channels,
@@ -85,14 +85,14 @@ class Grid:
     def departure(self, v: Any, dt: float = 1.0, out: Any = None) -> Any:
         """Displacements (shape, D) of the velocities (shape, D), both on the device; into `out` if given."""
         out = opencl.empty(v.shape) if out is None else out
-        self._program(1).departure(self._global, (ROW, 1, 1), v, out, np.float32(dt), *self._cells)
+        self._program(1).departure(self.work, (ROW, 1, 1), v, out, np.float32(dt), *self.cells)
         return out
 
     def gather(self, q: Any, displacements: Any, out: Any = None) -> Any:
         """q (shape, 1, 2, 3, 4, 8 or 16 channels) at the departure points; into `out` if given."""
         out = opencl.empty(q.shape) if out is None else out
         channels = q.size // int(np.prod(self.shape))
-        self._program(channels).advect(self._global, (ROW, 1, 1), q, displacements, out, *self._cells)
+        self._program(channels).advect(self.work, (ROW, 1, 1), q, displacements, out, *self.cells)
         return out
 
 

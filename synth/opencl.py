@@ -106,6 +106,13 @@ def empty(shape: tuple[int, ...] | int, dtype: Any = np.float32) -> Any:
     return cl_array.empty(_queue(), shape, dtype)
 
 
+def zeros(shape: tuple[int, ...] | int, dtype: Any = np.float32) -> Any:
+    """A device array of zeros."""
+    import pyopencl.array as cl_array
+
+    return cl_array.zeros(_queue(), shape, dtype)
+
+
 def finish() -> None:
     """Wait until the device has done all it was given (for timing)."""
     _queue().finish()

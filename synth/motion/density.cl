@@ -1,0 +1,30 @@
+// Smoke densities of several windows at once: LANES = CHANNELS floats per cell, interleaved. A departure point is
+// found once and serves all of them, and a cell's lanes are one vector load. advect.cl gives the interpolation.
+
+#include "advect.cl"
+
+// Inject a source into every lane: q = max(q, source), over a box of the grid whose first cell is (x0, y0, z0).
+kernel void inject(global float *restrict q, global const float *restrict source, const int x0, const int y0,
+                   const int z0, const int width, const int X, const int Y)
+{
+    const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
+    if (x >= width) return;
+    const int cell = ((z0 + z) * Y + y0 + y) * X + x0 + x;
+    const float injected = source[(z * (int)get_global_size(1) + y) * width + x];
+    STORE(fmax(LOAD(cell, q), (quantity)(injected)), cell, q);
+}
+
+// One step of every lane, out = q carried along d. Lane `take` is copied to `taken`, then lane `put` begins anew
+// from `fresh`; a negative lane is none.
+kernel void step_lanes(global const float *restrict q, global const float *restrict displacements,
+                       global float *restrict out, global const float *restrict fresh,
+                       global float *restrict taken, const int take, const int put, const int X, const int Y,
+                       const int Z)
+{
+    const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
+    if (x >= X) return;
+    const int cell = (z * Y + y) * X + x;
+    STORE(at_departure(q, displacements, x, y, z, X, Y, Z), cell, out);
+    if (take >= 0) taken[cell] = out[cell * CHANNELS + take];
+    if (put >= 0) out[cell * CHANNELS + put] = fresh[cell];
+}

@@ -1,0 +1,231 @@
+"""Smoke density carried by the motion: naive and windowed (ma09 supplement A, pseudocode 3 and 4).
+
+    O_i = naive(L)_i                                          the smoke under the coarse motion alone
+    D_i = O_{i-m}, then m times: inject, advect by F_{i-m+j}   the smoke one sees
+
+Each frame injects first and advects then. A source is injected by maximum, D = max(D, source): its smoke
+never exceeds the source's level, a resting source leaves its own picture, and nothing depends on the frame
+rate.
+
+Pseudocode 4 restarts each D_i and does m steps for it. Here the m windows that are under way advance side
+by side, one step per frame: the same numbers, bit for bit, with one departure map, no history of fields,
+and memory that does not grow with the frames. `window` is one frame alone, as the pseudocode writes it, for
+a farm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from synth import opencl
+from synth.advect import BORDERS, ROW, Grid, velocity_field
+from synth.field import domain_origin
+from synth.motion.coarse import upsample
+from synth.noise import gradient_noise
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where smoke enters. Lengths in world units: the domain is 1 high, its floor at y = 0, centred on x
+    and z.
+
+    kind           "ball" (a disc in 2-D) or "box"
+    centre         (x, y) or (x, y, z); z = 0 if left out
+    radius         of the ball or half the box's edge: a number, or one per axis (an ellipse; z as x if left
+    out)
+    softness       share of the radius over which the edge fades, 0 to 1 (at least a cell's width)
+    level          density injected, 0 to 1
+    streaks        contrast of seeded streaks across x and z, 0 (even) to 1: they draw the paths of the smoke
+    streak_size    width of a streak
+    streak_period  frames in which the streaks change
+    period, duty   smoke enters during the share `duty` of every `period` frames (puffs); duty 1 is always
+    seed           of the streaks
+    """
+
+    centre: tuple[float, ...]
+    radius: float | tuple[float, ...]
+    kind: str = "ball"
+    softness: float = 0.3
+    level: float = 1.0
+    streaks: float = 0.0
+    streak_size: float = 0.02
+    streak_period: float = 40.0
+    period: int = 1
+    duty: float = 1.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        radii = self.radius if isinstance(self.radius, tuple) else (self.radius,)
+        if self.kind not in ("ball", "box"):
+            raise ValueError(f"source kind {self.kind!r} is neither ball nor box")
+        if len(self.centre) not in (2, 3) or not all(np.isfinite(self.centre)):
+            raise ValueError(f"a source's centre is (x, y) or (x, y, z), not {self.centre}")
+        if not all(r > 0 for r in radii):
+            raise ValueError(f"a source's radius must be positive, not {self.radius}")
+        for name in ("softness", "level", "streaks", "duty"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ValueError(f"a source's {name} lies between 0 and 1, not at {getattr(self, name)}")
+        for name in ("streak_size", "streak_period", "period"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"a source's {name} must be positive, not {getattr(self, name)}")
+
+    def injected(self, shape: tuple[int, ...], frame: int) -> tuple[tuple[slice, ...], np.ndarray]:
+        """What enters before frame `frame` (from 1) is advected, on a grid of (Y, X) or (Z, Y, X) cells.
+
+        Returns the box of cells it touches and its density there, float32.
+        """
+        voxel = 1.0 / shape[-2]
+        radii = self.radius if isinstance(self.radius, tuple) else (self.radius,) * 3
+        radii = (*radii, radii[0])[:3]
+        distances, box = [], []
+        for component, (origin, n) in enumerate(zip(domain_origin(shape), shape[::-1], strict=True)):
+            centre = self.centre[component] if component < len(self.centre) else 0.0
+            radius = radii[component]
+            first = int(np.clip(np.floor((centre - radius - origin) / voxel), 0, n - 1))
+            last = int(np.clip(np.ceil((centre + radius - origin) / voxel), first, n - 1))
+            box.append(slice(first, last + 1))
+            position = origin + voxel * np.arange(first, last + 1)
+            distances.append(np.abs(position - centre) / radius)
+        grid = np.meshgrid(*distances[::-1], indexing="ij", sparse=True)
+        far = np.sqrt(sum(g * g for g in grid)) if self.kind == "ball" else np.maximum.reduce(
+            np.broadcast_arrays(*grid))
+        edge = max(self.softness, min(1.0, voxel / min(radii)))
+        inside = np.clip((1 - far) / edge, 0, 1)
+        density = self.level * inside * inside * (3 - 2 * inside) * self._streaks(shape, box, frame)
+        on = (frame - 1) % self.period < self.duty * self.period
+        return tuple(box[::-1]), (density if on else 0 * density).astype(np.float32)
+
+    def _streaks(self, shape: tuple[int, ...], box: list[slice], frame: int) -> np.ndarray | float:
+        """Factor 1 - streaks to 1, constant along y, over the box's cells."""
+        if self.streaks == 0:
+            return 1.0
+        origin, voxel = domain_origin(shape), 1.0 / shape[-2]
+        axes = [(origin[c] + voxel * np.arange(box[c].start, box[c].stop)) / self.streak_size
+                for c in range(len(shape)) if c != 1]
+        points = [*np.meshgrid(*axes[::-1], indexing="ij", sparse=True)[::-1], np.full((1,) * len(axes),
+                                                                                 frame / self.streak_period)]
+        lit = np.clip(0.5 + 2.0 * gradient_noise(points, self.seed), 0, 1)
+        return np.expand_dims(1 - self.streaks * (1 - lit), -2)
+
+
+def naive(F_frames: Iterable[np.ndarray], sources: Sequence[Source], *, scale: float = 1.0,
+          border: str = "zero") -> Iterator[np.ndarray]:
+    """Pseudocode 3: D_i = (D_{i-1} with the sources) advected by F_i, from an empty D_0.
+
+    F_frames  F_1, F_2, … (Y, X, 2) or (Z, Y, X, 3) float32, cells per frame
+    sources   what enters; D = max(D, each of them)
+    scale     cells of the density grid per cell of the field, along each axis; F is then interpolated
+    smoothly
+              (Catmull and Rom)
+    border    beyond the grid "zero" (no smoke comes in), "clamp" or "toroidal"
+    Yields D_1, D_2, …: float32 in [0, 1], one array per frame, the caller's own.
+    """
+    density = None
+    for i, F in enumerate(F_frames, 1):
+        if density is None:
+            density = _Lanes(_scaled(F, scale), 1, border)
+        density.inject(sources, i)
+        density.step(density.departure(F, F.shape[:-1]))
+        yield density.q.get()
+
+
+def windowed(L_frames: Iterable[np.ndarray], F_frames: Iterable[np.ndarray], sources: Sequence[Source],
+             m: int, *, scale: float = 1.0, border: str = "zero") -> Iterator[np.ndarray]:
+    """Pseudocode 4: D_i is O_{i-m} = naive(L)_{i-m}, carried on through the last m frames of F.
+
+    L_frames  L_1, L_2, … on F's grid or a coarser one (then upsampled linearly to F's, as F was made)
+    m         length of the window, frames
+    The rest as in `naive`. The pseudocode begins at i = m; frames i < m are yielded too, as windows of
+    length i, which is naive(F)_i. With F = L every m gives naive(F); with m the number of frames so does
+    every F.
+    """
+    if m < 1:
+        raise ValueError(f"the window m must be at least 1 frame, not {m}")
+    coarse: _Lanes | None = None
+    windows: list[_Lanes] = []
+    for i, (L, F) in enumerate(zip(L_frames, F_frames, strict=True), 1):
+        if coarse is None:
+            coarse = _Lanes(_scaled(F, scale), 1, border)
+            lanes = min(16, 1 << (m - 1).bit_length())
+            windows = [_Lanes(coarse.shape, lanes, border) for _ in range(-(-m // lanes))]
+            visible = opencl.empty(coarse.shape)
+        # the window that began at O_s lives in lane s mod m; frame i shows s = i - m, or 0 while i < m, and
+        # O_i begins the next one, in the lane that has just been shown (or was never used)
+        shown, begun = max(i - m, 0) % m, i % m
+        coarse.inject(sources, i)
+        coarse.step(coarse.departure(L, F.shape[:-1]))
+        departure = coarse.departure(F, F.shape[:-1])
+        for first, group in zip(range(0, m, lanes), windows, strict=True):
+            group.inject(sources, i)
+            group.step(departure, coarse.q, visible, shown - first, begun - first)
+        yield visible.get()
+
+
+def window(O: np.ndarray | None, F_frames: Sequence[np.ndarray], sources: Sequence[Source], i: int, *,
+           scale: float = 1.0, border: str = "zero") -> np.ndarray:
+    """One D_i of pseudocode 4 alone: the frame `windowed` yields as its i-th, bit for bit.
+
+    O         O_{i-m} on the density grid, or None for the empty O_0
+    F_frames  F_{i-m+1} … F_i, m of them (i of them from O_0)
+    """
+    density = _Lanes(_scaled(F_frames[0], scale), 1, border)
+    if O is not None:
+        if O.shape != density.shape:
+            raise ValueError(f"O has shape {O.shape}, the density grid {density.shape}")
+        density.q = opencl.to_device(np.asarray(O, np.float32))
+    for j, F in enumerate(F_frames, i - len(F_frames) + 1):
+        density.inject(sources, j)
+        density.step(density.departure(F, F.shape[:-1]))
+    return density.q.get()
+
+
+def _scaled(F: np.ndarray, scale: float) -> tuple[int, ...]:
+    if not (np.isfinite(scale) and scale > 0):
+        raise ValueError(f"the density's scale must be positive, not {scale}")
+    return tuple(max(1, round(n * scale)) for n in F.shape[:-1])
+
+
+class _Lanes:
+    """Densities of several windows on one grid, interleaved: `q` is (*shape, lanes) on the device, empty at
+    first."""
+
+    def __init__(self, shape: tuple[int, ...], lanes: int, border: str):
+        self.shape, self.lanes = shape, lanes
+        self.grid = Grid(shape, border)
+        self.q = opencl.zeros((*shape, lanes) if lanes > 1 else shape)
+        self._next = opencl.empty(self.q.shape)
+        self._displacements: Any = None
+        self._program = opencl.program(Path(__file__).with_suffix(".cl"), DIMS=len(shape), CHANNELS=lanes,
+                                       BORDER=BORDERS[border])
+
+    def inject(self, sources: Sequence[Source], frame: int) -> None:
+        """q = max(q, source) in every lane, for each source."""
+        for source in sources:
+            box, density = source.injected(self.shape, frame)
+            corner = [s.start for s in box[::-1]] + [0] * (3 - len(box))
+            size = [*density.shape[::-1], 1][:3]
+            sizes = [np.int32(n) for n in (*corner, size[0], self.shape[-1], self.shape[-2])]
+            self._program.inject((-(-size[0] // ROW) * ROW, *size[1:]), (ROW, 1, 1), self.q,
+                                 opencl.to_device(density), *sizes)
+
+    def departure(self, v: np.ndarray, field_shape: tuple[int, ...]) -> Any:
+        """Displacements by `v` on this grid: linearly to the field's cells, smoothly on to the density's."""
+        v = upsample(upsample(velocity_field(v), field_shape), self.shape, "cubic")
+        self._displacements = self.grid.departure(opencl.to_device(v), out=self._displacements)
+        return self._displacements
+
+    def step(self, displacements: Any, fresh: Any = None, taken: Any = None, take: int = -1,
+             put: int = -1) -> None:
+        """Advect every lane; then copy lane `take` to `taken`, and begin lane `put` anew from `fresh`."""
+        if fresh is None:
+            self.grid.gather(self.q, displacements, self._next)
+        else:
+            own = [np.int32(n if 0 <= n < self.lanes else -1) for n in (take, put)]
+            self._program.step_lanes(self.grid.work, (ROW, 1, 1), self.q, displacements, self._next, fresh,
+                                     taken, *own, *self.grid.cells)
+        self.q, self._next = self._next, self.q
