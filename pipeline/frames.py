@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from pipeline.errors import BadInput
 
-PART = re.compile(r"(\d+)(?:-(\d+)(?:x(\d+))?)?")
+PART = re.compile(r"([0-9]{1,9})(?:-([0-9]{1,9})(?:x([0-9]{1,9}))?)?")
 
 
 def frames(text: str, last: int) -> list[int]:

@@ -22,6 +22,9 @@ class Stock(Protocol):
     def own(self, frame: int) -> Any | None:
         """The product's own frame, if it is whole."""
 
+    def key(self, frame: int) -> str:
+        """What the product's own frame is made from, as its manifest will say."""
+
     @property
     def work(self) -> Path:
         """A folder for what an interrupted run needs to go on; emptied when the product is whole."""
@@ -31,7 +34,8 @@ class Stock(Protocol):
 class Product:
     """One series of files, `name.0001.suffix` …, or the one file `name.suffix`.
 
-    reads   dotted keys of the scene that its content depends on
+    reads   dotted keys of the scene that its content depends on; the first is blamed for values that do not do
+    methods modules of synth and render that compute it: their sources, and all these import, count for its key
     inputs  products it is made from, and which of their frames frame i needs: the "same", all "until" and with
             i, or the one file there is ("once")
     make    make(scene, stock, frames): yields (frame, value) for each of `frames` (ascending), in that order
@@ -44,6 +48,7 @@ class Product:
     suffix: Callable[[Scene], str]
     reads: tuple[str, ...]
     inputs: tuple[tuple[str, Frames], ...]
+    methods: tuple[str, ...]
     make: Callable[[Scene, Stock, list[int]], Iterator[tuple[int, Any]]]
     write: Callable[[Path, Any, Scene], None]
     read: Callable[[Path, Scene], Any]
@@ -51,7 +56,8 @@ class Product:
 
     def file(self, scene: Scene, frame: int) -> str:
         """File name of a frame."""
-        return f"{self.name}.{frame:04d}.{self.suffix(scene)}" if self.animated else f"{self.name}.{self.suffix(scene)}"
+        number = f".{frame:04d}" if self.animated else ""
+        return f"{self.name}{number}.{self.suffix(scene)}"
 
     def frames(self, scene: Scene) -> list[int]:
         """The frames there are: 1 to scene.frames, or [0]."""

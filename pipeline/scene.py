@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import copy
 import difflib
+import functools
 import re
 import tomllib
 import unicodedata
@@ -25,6 +26,15 @@ from pipeline.errors import BadInput
 from pipeline.schema import Scene
 
 Raw = Mapping[str, Any]
+WORDS = (  # pydantic's for ours
+    ("Input should", "should"),
+    ("a valid dictionary or object to extract fields from", "a table"),
+    ("a valid dictionary or instance of", "a table:"),
+    ("a valid tuple", "an array"),
+    ("Input is not a valid path for <class 'pathlib.Path'>", "should be a file's name"),
+    ("Tuple should have", "should have"),
+    (" after validation", ""),
+)
 
 
 @dataclass(frozen=True)
@@ -133,6 +143,8 @@ def _validated(file: Path, raw: Raw, *overrides: Overrides) -> Scene:
         for path in table.table:
             if key == path or key.startswith((f"{path}.", f"{path}[")):
                 raise BadInput(file, f'{table.where}."{path}"' + key[len(path):], reason)
+            if path.startswith(f"{key}."):  # the fault lies above what was overridden: a table nobody knows
+                raise BadInput(file, f'{table.where}."{path}"', reason)
     raise BadInput(file, f"{overrides[-1].where}: {key}" if overrides else key, reason)
 
 
@@ -152,6 +164,8 @@ def _first_fault(raw: Raw, error: ValidationError) -> tuple[str, str]:
             table = table.get(part, {})
             model = _model_of(field.annotation if field else None, table) or model
         # else the part is pydantic's name for a branch of a union, which the user never wrote
+    if fault["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        key += ".kind"
     return key, _reason(fault, model)
 
 
@@ -177,7 +191,7 @@ def _reason(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
         case "missing":
             return "is missing"
         case "union_tag_not_found":
-            return "kind is missing"
+            return "is missing"
         case "union_tag_invalid":
             kinds = re.findall(r"'([^']*)'", context["expected_tags"])
             return f"unknown kind {context['tag']!r}{_did_you_mean(context['tag'], kinds)}"
@@ -187,11 +201,9 @@ def _reason(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
         case "value_error":
             return str(context["error"])
         case _:
-            message = fault["msg"].replace("Input should", "should").replace("valid dictionary or object to "
-                                                                              "extract fields from", "table")
-            shown = repr(given) if isinstance(given, str | int | float | bool) else type(given).__name__
-            return f"{message[0].lower()}{message[1:]}, not {shown}".replace("dict", "a table").replace(
-                "not list", "not an array")
+            message = functools.reduce(lambda text, pair: text.replace(*pair), WORDS, fault["msg"])
+            kinds = {dict: "a table", list: "an array"}
+            return f"{message[0].lower()}{message[1:]}, not {kinds.get(type(given)) or repr(given)}"
 
 
 def _did_you_mean(given: str, known: Any) -> str:
@@ -205,6 +217,9 @@ def _fault_between_tables(scene: Scene) -> tuple[str, str]:
     columns, rows = detail.size
     if exemplar.size > min(columns, rows):
         return "exemplar.size", f"an exemplar of {exemplar.size}² is larger than the output ({columns}×{rows})"
+    if scene.coarse.kind != "file" and columns * scene.coarse.size[1] != rows * scene.coarse.size[0]:
+        coarse = "×".join(map(str, scene.coarse.size))
+        return "detail.size", f"{columns}×{rows} has not the shape of coarse.size, {coarse}"
     if isinstance(detail.levels, int) and exemplar.size >> (detail.levels - 1) < 4:
         return "detail.levels", f"{detail.levels} levels bring an exemplar of {exemplar.size}² below 4 cells"
     if scene.figure.frame > scene.frames:

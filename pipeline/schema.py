@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, ValidationInfo
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict, ValidationInfo
 
 PROJECT_SCENES = Path(__file__).resolve().parent.parent / "scenes"
 LARGEST = 4096  # cells or pixels along an axis; beyond it a slip of the keyboard is likelier than a wish
@@ -46,9 +46,21 @@ def key(description: str, default: Any = ..., unit: str = "", **limits: Any) -> 
 
 
 Asset = Annotated[Path, Strict(False), AfterValidator(_inside)]
+
+
+def _odd(width: int) -> int:
+    if width % 2 == 0:
+        raise ValueError(f"should be odd, not {width}")
+    return width
+
+
+def _several(value: object) -> object:
+    return [value] if isinstance(value, int | float) else value
+
+
+Width = Annotated[int, Field(ge=3, le=33), AfterValidator(_odd)]
 Cells = Annotated[int, Field(ge=4, le=LARGEST)]
 Cells2 = Annotated[tuple[Cells, Cells], Strict(False)]
-Share2 = Annotated[tuple[float, float], Strict(False)]
 
 
 class ProceduralExemplar(Table):
@@ -58,41 +70,82 @@ class ProceduralExemplar(Table):
     size: int = key("edge; with detail.size it sets the texture scale", 64, "cells", ge=8, le=1024)
 
 
-class FileExemplar(Table):
-    """An exemplar from a file (§4): the curl of a bitmap's grey values, strokes of a drawing along their
-    direction, a field (EXR or VDB), or the optical flow of a clip."""
+class BitmapExemplar(Table):
+    """The curl of a picture's grey values (§4: "we take curl on the gray scale magnitude")."""
 
-    kind: Literal["bitmap", "drawing", "field", "clip"] = key("what the file holds")
-    file: Asset = key("bitmap and drawing: PNG; field: EXR or VDB; clip: a video")
-    size: int = key("edge, to which the file is resampled", 64, "cells", ge=8, le=1024)
+    kind: Literal["bitmap"] = key("a picture")
+    file: Asset = key("PNG; its central square is taken")
+    size: int = key("edge, to which it is resampled", 64, "cells", ge=8, le=1024)
+    blur: float = key("standard deviation of a Gaussian on the picture", 1.0, "cells", ge=0, le=64)
+
+
+class DrawingExemplar(Table):
+    """The strokes of a hand drawing, along their direction (§1, "manual art")."""
+
+    kind: Literal["drawing"] = key("a drawing")
+    file: Asset = key("PNG (an open stroke starts at its red dot) or SVG")
+    size: int = key("edge", 64, "cells", ge=8, le=1024)
+
+
+class FieldExemplar(Table):
+    """A field made elsewhere."""
+
+    kind: Literal["field"] = key("a field")
+    file: Asset = key("EXR (channels x, y) or VDB (grid vel, its middle slice), any unit")
+    size: int = key("edge, to which its central square is resampled", 64, "cells", ge=8, le=1024)
+    toroidal: bool = key("take out the jumps where the tile's borders meet", False)
+
+
+class ClipExemplar(Table):
+    """The mean optical flow of a clip (§1, "captured data")."""
+
+    kind: Literal["clip"] = key("a clip")
+    file: Asset = key("a video")
+    size: int = key("edge, to which its central square is resampled", 64, "cells", ge=8, le=1024)
 
 
 class SmokeMotion(Table):
     """L by simulation: stable fluids with vorticity confinement (§4: [Fedkiw et al. 2001])."""
 
-    kind: Literal["smoke"] = key("simulated smoke")
+    kind: Literal["smoke"] = key("a plume that rises from a hot ball")
     size: Cells2 = key("columns and rows of L", (64, 64), "cells")
+    radius: float = key("of the hot ball", 0.08, "heights", gt=0, le=0.5)
+    height: float = key("of the hot ball's centre", 0.1, "heights", ge=0, le=1)
+    buoyancy: float = key("acceleration of the hottest smoke", 9.5e-4, "heights per frame²", ge=0, le=0.1)
+    confinement: float = key("ε of [Fedkiw et al. 2001]: what keeps vortices", 0.15, "per frame", ge=0, le=2)
+    cooling: float = key("share of the temperature lost", 0.01, "per frame", ge=0, lt=1)
+    sway: float = key("sideways wandering of the rising smoke, by seeded noise", 2.0, "buoyancies", ge=0, le=20)
+    sway_period: float = key("in which it wanders from side to side", 20.0, "frames", gt=0, le=100000)
+    warmup: int = key("simulated before the first", 0, "frames", ge=0, le=10000)
 
 
 class NoiseMotion(Table):
-    """L by curl noise (§4, figure 7: [Bridson et al. 2007])."""
+    """L by curl noise ([Bridson et al. 2007], of figure 7)."""
 
-    kind: Literal["curl-noise"] = key("the curl of a noise potential")
+    kind: Literal["curl-noise"] = key("the curl of a random potential")
     size: Cells2 = key("columns and rows of L", (64, 64), "cells")
+    octaves: int = key("each of half the size of the one before", 3, ge=1, le=10)
+    length: float = key("of the largest features", 0.5, "heights", gt=0, le=10)
+    gain: float = key("speed of an octave over that of the one before", 0.6, ge=0, le=2)
+    speed: float = key("rms of the first frame", 1.0, "cells of L per frame", ge=0, le=100)
+    period: float = key("in which the largest features turn over", 60.0, "frames", gt=0, le=100000)
 
 
 class AnalyticMotion(Table):
-    """L by formula."""
+    """L by formula, steady, free of divergence."""
 
     kind: Literal["analytic"] = key("a formula")
     size: Cells2 = key("columns and rows of L", (64, 64), "cells")
+    flow: Literal["constant", "diagonal", "rotation", "shear", "saddle", "vortex-pair"] = key("its form", "constant")
+    speed: float = key("largest", 1.0, "cells of L per frame", gt=0, le=100)
+    angle: float = key("turns the whole pattern", 0.0, "degrees", ge=-360, le=360)
 
 
 class FileMotion(Table):
     """L from a file."""
 
     kind: Literal["file"] = key("a field, the same in every frame")
-    file: Asset = key("EXR (channels x, y) or VDB (grid vel), world units per second")
+    file: Asset = key("EXR (channels x, y) or VDB (grid vel, its middle slice), world units per second")
 
 
 class Detail(Table):
@@ -101,7 +154,7 @@ class Detail(Table):
     size: Cells2 = key("columns and rows of H and F", (256, 256), "cells")
     levels: Annotated[int, Field(ge=1, le=10)] | Literal["auto"] = key(
         "of the image pyramid; \"auto\" brings the exemplar down to 8 cells", "auto")
-    neighborhoods: Annotated[tuple[Annotated[int, Field(ge=3, le=33)], ...], Strict(False)] = key(
+    neighborhoods: Annotated[tuple[Width, ...], Strict(False)] = key(
         "widths, odd, in the order used (§4: 17² followed by 9²)", (17, 9), "cells", min_length=1, max_length=4)
     iterations: int = key("of search and assignment with each width (§4: 3 to 5)", 4, ge=1, le=50)
     search: Literal["exact", "k-coherence"] = key("exact, or k-coherence (§3.7)", "exact")
@@ -117,34 +170,61 @@ class Combine(Table):
 
 
 class Source(Table):
-    """Where smoke enters, in every frame."""
+    """Where smoke enters, in every frame: D = max(D, source) (supplement A: "inject density sources").
+    World units: the domain is 1 high, its floor at y = 0, centred on x = 0 and z = 0."""
 
-    centre: Share2 = key("share of the width and height", (0.5, 0.1), "share of the domain")
-    radius: float = key("of the disc", 0.1, "share of the height", gt=0, le=1)
+    kind: Literal["ball", "box"] = key("its form", "ball")
+    centre: Annotated[tuple[float, ...], Strict(False)] = key(
+        "(x, y) or (x, y, z)", (0.0, 0.1), "heights", min_length=2, max_length=3)
+    radius: Annotated[tuple[Annotated[float, Field(gt=0, le=10)], ...], Strict(False), BeforeValidator(_several)] = key(
+        "of the ball, or half the box's edge; one number, or one for each axis", (0.08,), "heights",
+        min_length=1, max_length=3)
+    softness: float = key("share of the radius over which the edge fades", 0.3, ge=0, le=1)
+    level: float = key("density injected", 1.0, ge=0, le=1)
+    streaks: float = key("contrast of streaks, which draw the paths of the smoke", 0.0, ge=0, le=1)
+    streak_size: float = key("width of a streak", 0.02, "heights", gt=0, le=1)
+    streak_period: float = key("in which the streaks change", 40.0, "frames", gt=0, le=100000)
+    period: int = key("of puffs", 1, "frames", ge=1, le=100000)
+    duty: float = key("share of the period during which smoke enters", 1.0, ge=0, le=1)
 
 
 class Density(Table):
     """The smoke carried by F (supplement A)."""
 
-    scheme: Literal["windowed", "naive"] = key("pseudocode 4 or 3", "windowed")
+    scheme: Literal["windowed", "naive"] = key("pseudocode 4, or 3", "windowed")
     m: int = key("frames of the window (supplement A: 10 to 20)", 16, "frames", ge=1, le=1000)
-    scale: int = key("density cells per field cell, each way", 2, ge=1, le=8)
-    source: Source = key("where smoke enters", Source())
+    scale: int = key("density cells per field cell, along each axis", 2, ge=1, le=8)
+    border: Literal["zero", "clamp", "toroidal"] = key("what comes in over the border: nothing, the same, the other "
+                                                       "side", "zero")
+    sources: Annotated[tuple[Source, ...], Strict(False)] = key(
+        "where smoke enters, an array of tables [[density.sources]]", (Source(),), min_length=1, max_length=64)
 
 
-class FlatRender(Table):
-    """2-D smoke: lit in its plane, or ink on white paper."""
+class LitRender(Table):
+    """2-D smoke, lit in its own plane."""
 
-    kind: Literal["lit", "ink"] = key("lit by a key light in its plane, or ink on paper")
+    kind: Literal["lit"] = key("a sheet of smoke that shadows itself")
     width: int = key("of the picture", 1024, "pixels", ge=16, le=LARGEST)
+
+
+class InkRender(Table):
+    """2-D smoke as ink on white paper."""
+
+    kind: Literal["ink"] = key("ink on paper")
+    width: int = key("of the picture", 1024, "pixels", ge=16, le=LARGEST)
+    colour: Literal["indigo", "sepia", "black"] = key("of the ink", "indigo")
 
 
 class VolumeRender(Table):
     """A volume path-traced by Mitsuba."""
 
     kind: Literal["volume"] = key("a volume in a studio")
-    width: int = key("of the picture", 1024, "pixels", ge=16, le=LARGEST)
-    spp: int = key("samples per pixel", 64, ge=1, le=65536)
+    width: int = key("of the picture", 512, "pixels", ge=16, le=LARGEST)
+    height: int = key("of the picture", 640, "pixels", ge=16, le=LARGEST)
+    spp: int = key("paths per pixel", 64, ge=1, le=65536)
+    extinction: float = key("of smoke of density 1", 60.0, "per height", gt=0, le=10000)
+    bowl: Annotated[tuple[Annotated[float, Field(gt=0, le=1)], Annotated[float, Field(gt=0, le=1)]],
+                    Strict(False)] | None = key("radius and height of the bowl that the plume rises from", None, "heights")
 
 
 class NoRender(Table):
@@ -154,11 +234,20 @@ class NoRender(Table):
     width: int = key("of a panel", 1024, "pixels", ge=16, le=LARGEST)
 
 
-class Figure(Table):
-    """The panels of X.png and X.mp4."""
+Panel = Literal["input", "exemplar", "exemplar-colour", "exemplar-arrows", "coarse", "coarse-colour", "detail",
+                "detail-colour", "detail-arrows", "combined", "combined-colour", "result"]
 
-    panels: Annotated[tuple[str, ...], Strict(False)] = key("from left to right", ("result",), min_length=1)
-    frame: int = key("the frame the still shows; 0 is the last", 0, ge=0)
+
+class Figure(Table):
+    """The panels of X.png and X.mp4. With several variants and one panel, one panel for each of them; with
+    several of both, one row for each variant."""
+
+    panels: Annotated[tuple[Panel, ...], Strict(False)] = key("from left to right", ("result",), min_length=1)
+    labels: Annotated[tuple[str, ...], Strict(False)] = key(
+        "below the panels, *italics* between asterisks; none: their usual ones", ())
+    columns: int = key("panels in a row; 0: all", 0, ge=0, le=64)
+    panel: int = key("width of a panel", 512, "pixels", ge=16, le=LARGEST)
+    frame: int = key("the frame the still shows; 0: the last", 0, ge=0)
 
 
 class Scene(Table):
@@ -169,10 +258,10 @@ class Scene(Table):
     seed: int = key("of every random choice", 1, ge=0, le=2**63 - 1)
     frames: int = key("length of the animation", 90, "frames", ge=1, le=100000)
     fps: float = key("speed of the animation", 30, "frames per second", gt=0, le=1000)
-    exemplar: ProceduralExemplar | FileExemplar = Field(discriminator="kind")
+    exemplar: ProceduralExemplar | BitmapExemplar | DrawingExemplar | FieldExemplar | ClipExemplar = Field(discriminator="kind")
     coarse: SmokeMotion | NoiseMotion | AnalyticMotion | FileMotion = Field(discriminator="kind")
     detail: Detail = Detail()
     combine: Combine
     density: Density = Density()
-    render: FlatRender | VolumeRender | NoRender = Field(discriminator="kind")
+    render: LitRender | InkRender | VolumeRender | NoRender = Field(discriminator="kind")
     figure: Figure = Figure()

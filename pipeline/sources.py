@@ -1,7 +1,6 @@
-"""The sources a product depends on: a module, all of the project's that it imports, and their kernels.
+"""The sources a product depends on: the module that makes it, and the methods it uses with all they import.
 
-Only what computes counts: formatting and comments do not, so tidying a module re-makes nothing. What merely
-orders the work (scenes, manifests, stages, the CLI) is left out by `ORDER`.
+Only what computes counts: formatting and comments do not, so tidying a module re-makes nothing.
 """
 
 from __future__ import annotations
@@ -12,24 +11,21 @@ import hashlib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("synth", "render", "pipeline")
-ORDER = ("pipeline.errors", "pipeline.scene", "pipeline.schema", "pipeline.product")
+PACKAGES = ("synth", "render")
 
 
 @functools.cache
-def sources(module: str) -> tuple[Path, ...]:
-    """The .py, .cl and .h files that `module` (dotted) depends on, itself first."""
-    found: dict[str, None] = {}
-    waiting = [module]
+def sources(method: str) -> tuple[Path, ...]:
+    """The .py, .cl and .h files that `method`, a dotted module of synth or render, depends on; itself first."""
+    found: list[Path] = []
+    waiting = [method]
     while waiting:
-        name = waiting.pop()
-        file = ROOT.joinpath(*name.split(".")).with_suffix(".py")
-        if name in found or name in ORDER or not file.is_file():
-            continue
-        found[name] = None
-        waiting += _imported(file)
-    kernels = [_file(name).with_suffix(suffix) for name in found for suffix in (".cl", ".h")]
-    return (*map(_file, found), *(file for file in kernels if file.is_file()))
+        file = _file(waiting.pop())
+        if file.is_file() and file not in found:
+            found.append(file)
+            waiting += _imported(file)
+    kernels = [file.with_suffix(suffix) for file in found for suffix in (".cl", ".h")]
+    return (*found, *(file for file in kernels if file.is_file()))
 
 
 def _file(module: str) -> Path:
@@ -37,7 +33,7 @@ def _file(module: str) -> Path:
 
 
 def _imported(file: Path) -> list[str]:
-    """The project's modules that `file` imports, at its top or inside a function."""
+    """The modules of PACKAGES that `file` imports, at its top or inside a function."""
     names: list[str] = []
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
@@ -49,10 +45,11 @@ def _imported(file: Path) -> list[str]:
 
 
 @functools.cache
-def digest(module: str) -> str:
-    """SHA-256 of what `module` and all it depends on say to the machine."""
+def digest(maker: str, methods: tuple[str, ...]) -> str:
+    """SHA-256 of what module `maker` by itself, and `methods` with all they depend on, say to the machine."""
+    files = {_file(maker), *(file for method in methods for file in sources(method))}
     whole = hashlib.sha256()
-    for file in sorted(sources(module)):
+    for file in sorted(files):
         text = file.read_text()
         whole.update(file.relative_to(ROOT).as_posix().encode())
         whole.update(ast.dump(ast.parse(text)).encode() if file.suffix == ".py" else text.encode())

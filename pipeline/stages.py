@@ -38,7 +38,6 @@ class Works:
         self._keys: dict[tuple[Path, str], str] = {}
         self._chains: dict[tuple[Path, str], list[str]] = {}
         self._plans: dict[tuple[str, str], str] = {}
-        self._sources = {p.name: sources.digest(p.make.__module__) for ps in self.products.values() for p in ps.values()}
 
     # -- where ----------------------------------------------------------------------------------------------
 
@@ -93,7 +92,8 @@ class Works:
             if None in hashes:
                 return None
             tables = product.tables(self.scenes.variants[variant])
-            self._keys[file.parent, file.name] = manifest.digest([name, tables, self._sources[name], hashes])
+            code = sources.digest(product.make.__module__, product.methods)
+            self._keys[file.parent, file.name] = manifest.digest([name, tables, code, hashes])
         return self._keys[file.parent, file.name]
 
     def _chain(self, variant: str, name: str, frame: int) -> str | None:
@@ -109,6 +109,15 @@ class Works:
     def missing(self, variant: str, name: str, frames: Iterable[int]) -> list[int]:
         """Those of `frames` that are not whole."""
         return [frame for frame in frames if not self.entry(variant, name, frame)]
+
+    def require(self, variant: str, name: str, frame: int) -> Entry:
+        """The entry of a frame; BadInput if it is not whole, with the command that makes it."""
+        entry = self.entry(variant, name, frame)
+        if not entry:
+            product = self.products[variant][name]
+            file = product.file(self.scenes.variants[variant], frame)
+            raise BadInput(self.scenes.file, file, f"is not there yet: run flowloom {product.stage} on this scene first")
+        return entry
 
     # -- making -------------------------------------------------------------------------------------------------
 
@@ -127,23 +136,24 @@ class Works:
         product, scene = self.products[variant][name], self.scenes.variants[variant]
         wanted = [f for f in product.frames(scene) if frames is None or not product.animated or f in frames]
         for other, which in product.inputs:
-            before = {"same": wanted, "until": range(1, max(wanted, default=0) + 1), "once": [0]}[which]
-            if self.missing(variant, other, before):
-                verb = self.products[variant][other].stage
-                raise BadInput(self.scenes.file, other, f"is not there yet: run flowloom {verb} on this scene first")
+            for frame in {"same": wanted, "until": range(1, max(wanted, default=0) + 1), "once": [0]}[which]:
+                self.require(variant, other, frame)
         missing = self.missing(variant, name, wanted)
         if not missing:
             return
         label = f"{product.stage} {name}" + (f" ({variant})" if len(self.makers(name)) > 1 else "")
         folder = self.folder(variant, name)
+        stock = _Stock(self, variant, product)
         with progress.task(label, len(wanted), len(wanted) - len(missing)) as advance:
-            for frame, value in product.make(scene, _Stock(self, variant, product), missing):
-                file = self.file(variant, name, frame)
-                product.write(file, value, scene)
-                key = self.key(variant, name, frame)
-                assert key, "inputs were whole above"
-                folder.add(file.name, key)
-                advance()
+            try:
+                for frame, value in product.make(scene, stock, missing):
+                    file = self.file(variant, name, frame)
+                    product.write(file, value, scene)
+                    folder.add(file.name, stock.key(frame))
+                    advance()
+            except ValueError as error:
+                # the methods say so of values that no scene should hold; the schema cannot know them all
+                raise BadInput(self.scenes.file, product.reads[0], str(error)) from error
 
     def _close(self, stage: str) -> None:
         """Write the manifest of each folder of the stage that is whole, and drop folders of variants of the past."""
@@ -178,6 +188,9 @@ class _Stock:
     def own(self, frame: int) -> Any | None:
         whole = self._works.entry(self._variant, self._product.name, frame)
         return self.read(self._product.name, frame) if whole else None
+
+    def key(self, frame: int) -> str:
+        return self._works.key(self._variant, self._product.name, frame) or ""
 
     @property
     def work(self) -> Path:

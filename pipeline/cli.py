@@ -1,0 +1,157 @@
+"""The command line: one command per stage, and what goes round them.
+
+Exit codes: 0 done, 1 differs (diff), 2 bad input, 3 the environment lacks something, 4 storage or memory,
+130 interrupted, 143 terminated; 70 is a fault of flowloom itself, with its traceback.
+Heavy modules are imported inside the commands, so `flowloom --help` is instant.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import sys
+import traceback
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+
+from pipeline.errors import EnvironmentMissing, FlowloomError, StorageFailed, Terminated
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+FAULT = 70  # EX_SOFTWARE of sysexits.h
+OUT = Path("out")
+OURS = ("pipeline", "synth", "render")
+
+app = App(
+    name="flowloom",
+    help="Motion by example: from a small exemplar and a coarse motion to volumes, pictures and figures.",
+    version_flags=[],
+    help_format="plaintext",  # markdown would load rich.markdown, a quarter of a second
+    result_action="return_value",
+)
+
+SceneFile = Annotated[Path, Parameter(help="The scene, a TOML file.")]
+Quick = Annotated[bool, Parameter(negative="", help="Small and fast: the scene's [quick] overrides; writes OUT/quick.")]
+Out = Annotated[Path, Parameter(help="Where X/fields, X/geometry, X/images and X.png are written.")]
+Quiet = Annotated[bool, Parameter(negative="", help="No progress.")]
+FrameRange = Annotated[str | None, Parameter(help="Only these, as 1-10,20,30-40x2; the stages before must be done.")]
+
+
+def _run(verb: str, scene: Path, quick: bool, out: Path, quiet: bool, frames: str | None = None) -> None:
+    from pipeline import stages
+    from pipeline.frames import frames as parsed
+    from pipeline.progress import Progress
+    from pipeline.scene import load
+
+    scenes = load(scene, quick)
+    last = max(s.frames for s in scenes.variants.values())
+    stages.run(verb, scenes, out, Progress(quiet), parsed(frames, last) if frames else None)
+
+
+@app.command
+def synth(scene: SceneFile, /, *, quick: Quick = False, out: Out = OUT, quiet: Quiet = False) -> None:
+    """Synthesize the motion fields: exemplar, L and H, into OUT/X/fields."""
+    _run("synth", scene, quick, out, quiet)
+
+
+@app.command
+def bake(scene: SceneFile, /, *, frames: FrameRange = None, quick: Quick = False, out: Out = OUT,
+         quiet: Quiet = False) -> None:
+    """Bake F and the density, in world units, into OUT/X/geometry."""
+    _run("bake", scene, quick, out, quiet, frames)
+
+
+@app.command
+def render(scene: SceneFile, /, *, frames: FrameRange = None, quick: Quick = False, out: Out = OUT,
+           quiet: Quiet = False) -> None:
+    """Render the frames and what the figure needs into OUT/X/images."""
+    _run("render", scene, quick, out, quiet, frames)
+
+
+@app.command
+def figure(scene: SceneFile, /, *, quick: Quick = False, out: Out = OUT, quiet: Quiet = False) -> None:
+    """Set the figure: OUT/X/X.png and OUT/X/X.mp4, running whatever stage is not up to date."""
+    _run("figure", scene, quick, out, quiet)
+
+
+@app.command(name="list")
+def list_(folder: Annotated[Path | None, Parameter(help="A folder of scenes; else the project's.")] = None, /, *,
+          out: Out = OUT) -> None:
+    """List the scenes of a folder: name, source, title, and whether its figure is there."""
+    from pipeline.listing import lines
+
+    for line in lines(folder, out):
+        print(line)
+
+
+@app.command
+def farm(scene: SceneFile, /, *, workers: Annotated[int, Parameter(help="Processes at a time.")] = 2,
+         batch: Annotated[int, Parameter(help="Frames per process.")] = 10,
+         dry_run: Annotated[bool, Parameter(negative="", help="Only print the commands, for a farm of your own.")]
+         = False, quick: Quick = False, out: Out = OUT, quiet: Quiet = False) -> None:
+    """Run the stages in batches of frames on several processes of this machine."""
+    from pipeline import farm as farming
+
+    farming.run(scene, workers, batch, quick, out, quiet, dry_run)
+
+
+def _terminated(_signal: int, _frame: Any) -> None:
+    raise Terminated
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a command and exit with its code; every foreseen failure is one line on stderr."""
+    signal.signal(signal.SIGTERM, _terminated)
+    sys.exit(run(sys.argv[1:] if arguments is None else list(arguments)))
+
+
+def run(arguments: list[str]) -> int:
+    """Run a command; its exit code."""
+    try:
+        return app(arguments, exit_on_error=False, print_error=False) or 0
+    except CycloptsError as error:
+        return _say(f"{error}; flowloom --help shows what there is", 2)
+    except FlowloomError as error:
+        return _say(str(error), error.exit_code)
+    except KeyboardInterrupt:
+        return _say("interrupted; run the same command again to go on from the last whole frame", 130)
+    except Terminated:
+        return _say("terminated; run the same command again to go on from the last whole frame", 143)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python complains at exit
+        return 0
+    except Exception as error:
+        known = foreseen(error)
+        if known is None:
+            traceback.print_exc()
+            return _say("flowloom: this is a fault of flowloom; please report it with the lines above", FAULT)
+        return _say(str(known), known.exit_code)
+
+
+def foreseen(error: Exception) -> FlowloomError | None:
+    """The failure behind an exception that came from a library: memory, storage or the environment."""
+    kind = type(error).__name__
+    if isinstance(error, MemoryError) or "OUT_OF_" in str(error) or "bad_alloc" in str(error):
+        return StorageFailed("memory", "not enough; try --quick, a smaller size, or close other programs")
+    if kind in ("OpenCLUnavailable", "RenderUnavailable"):
+        return EnvironmentMissing(f"{error}; flowloom doctor shows more")
+    if isinstance(error, ImportError) and (error.name or "").split(".")[0] not in OURS:
+        return EnvironmentMissing(f"{error}; run make setup, or flowloom doctor to see what is missing")
+    if isinstance(error, OSError) and error.errno in (
+            errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR,
+            errno.EISDIR, errno.EMFILE, errno.ENAMETOOLONG):
+        return StorageFailed(error.filename or "storage", error.strerror or str(error))
+    return None
+
+
+def _say(line: str, code: int) -> int:
+    print(" ".join(line.split()), file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+"""The figure: panels, labels, legends, as one still X.png and one animation X.mp4.
+
+A scene without variants has its panels in one row (or rows of `figure.columns`). With variants and one panel,
+that panel stands once for each variant; with several panels, each variant has a row.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipeline import manifest, panels, sources
+from pipeline.files import pictures, video
+from pipeline.progress import Progress
+from pipeline.schema import Scene
+
+if TYPE_CHECKING:
+    from pipeline.stages import Works
+
+LABELS = {
+    "input": "input", "exemplar": "exemplar *I*", "exemplar-colour": "exemplar *I*", "exemplar-arrows": "exemplar *I*",
+    "coarse": "coarse motion *L*", "coarse-colour": "coarse motion *L*", "detail": "detail *H′*",
+    "detail-colour": "detail *H′*", "detail-arrows": "detail *H′*", "combined": "*F* = *L* + *ωH′*",
+    "combined-colour": "*F* = *L* + *ωH′*", "result": "result",
+}
+METHODS = ("render.layout", "render.film", "render.lic")
+
+
+def make(works: Works, progress: Progress) -> None:
+    """Set X.png and X.mp4, unless they are whole. The images must be."""
+    scenes = list(works.scenes.variants.values())
+    last = max(scene.frames for scene in scenes)
+    still = scenes[0].figure.frame or last
+    folder = manifest.Folder(works.root)
+    png, mp4 = f"{works.scenes.name}.png", f"{works.scenes.name}.mp4"
+    keys = {png: _key(works, [still]), mp4: _key(works, range(1, last + 1))}
+    if not folder.whole(png, keys[png]):
+        pictures.write(works.root / png, sheet(works, still))
+        folder.add(png, keys[png])
+    if not folder.whole(mp4, keys[mp4]):
+        with progress.task("figure", last) as advance:
+
+            def sheets() -> Iterator[np.ndarray]:
+                for frame in range(1, last + 1):
+                    yield sheet(works, frame)
+                    advance()
+
+            video.write(works.root / mp4, sheets(), scenes[0].fps)
+        folder.add(mp4, keys[mp4])
+    folder.close(keys, {"scene": works.scenes.name, "stage": "figure"})
+
+
+def _key(works: Works, frames: Any) -> str:
+    """What a figure of these frames depends on."""
+    shown = [works.scenes.variants[variant].figure.model_dump() for variant in works.scenes.variants]
+    hashes = []
+    for variant, panel in _places(works):
+        product = works.products[variant][panels.picture_of(panel)]
+        for frame in dict.fromkeys(_frame(product.animated, works.scenes.variants[variant], f) for f in frames):
+            entry = works.require(variant, product.name, frame)
+            hashes.append(entry.sha256)
+    kinds = [scene.render.kind for scene in works.scenes.variants.values()]
+    names = list(works.scenes.variants)
+    fps = next(iter(works.scenes.variants.values())).fps
+    return manifest.digest([shown, names, kinds, fps, hashes, sources.digest(__name__, METHODS)])
+
+
+def _frame(animated: bool, scene: Scene, frame: int) -> int:
+    """The frame of a product to show: an animation that is shorter than another stands still at its end."""
+    return min(frame, scene.frames) if animated else 0
+
+
+def _places(works: Works) -> list[tuple[str, str]]:
+    """(variant, panel) of the figure, in reading order."""
+    return [(variant, panel) for variant, scene in works.scenes.variants.items() for panel in scene.figure.panels]
+
+
+def sheet(works: Works, frame: int) -> np.ndarray:
+    """The figure at a frame, (h, w, 3) uint8 sRGB."""
+    from render import layout
+
+    scenes = works.scenes.variants
+    first = next(iter(scenes.values()))
+    several = len(scenes) > 1 or "" not in scenes
+    shown = []
+    for variant, name in _places(works):
+        label = _label(scenes[variant], name)
+        if several:
+            alone = len(scenes[variant].figure.panels) == 1
+            label = variant if alone or name == scenes[variant].figure.panels[0] else label
+        shown.append(_panel(works, variant, name, frame, label))
+    if several and len(first.figure.panels) > 1:
+        columns = len(first.figure.panels)
+    else:
+        columns = first.figure.columns or len(shown)
+    rows = [shown[start:start + columns] for start in range(0, len(shown), columns)]
+    return layout.figure(rows)
+
+
+def _label(scene: Scene, panel: str) -> str:
+    labels = scene.figure.labels
+    return labels[scene.figure.panels.index(panel)] if labels else LABELS[panel]
+
+
+def _panel(works: Works, variant: str, name: str, frame: int, label: str) -> Any:
+    from render import film, layout, lic
+
+    scene = works.scenes.variants[variant]
+    product = works.products[variant][panels.picture_of(name)]
+    file = works.file(variant, product.name, _frame(product.animated, scene, frame))
+    light = product.read(file, scene)
+    filmic = name == "result" and scene.render.kind != "ink"
+    shown = layout.fitted(film.developed(light, "filmic" if filmic else "straight"), scene.figure.panel)
+    legend = lic.wheel(scene.figure.panel // 6) if name.endswith("-colour") else None
+    return layout.Panel(shown, label, legend=legend)

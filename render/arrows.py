@@ -1,0 +1,69 @@
+"""Arrows on a picture, as ma09 figure 2 shows the value of a field at a few points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+Colour = tuple[float, float, float]
+RED: Colour = (0.80, 0.10, 0.08)  # the correct value
+GREEN: Colour = (0.10, 0.52, 0.16)  # the value without the coordinate transformation
+
+HEAD = 0.42  # length of the head as a share of the arrow's
+WIDTH = 0.085  # of the shaft, as a share of the longest arrow's length
+
+
+def drawn(picture: np.ndarray, tails: np.ndarray, vectors: np.ndarray, length: float, colour: Colour,
+          ) -> np.ndarray:
+    """`picture` (h, w, 3) display values with an arrow for each vector, edges smooth, a light rim round it.
+
+    tails: (N, 2) x, y in pixels from the lower left corner; vectors: (N, 2), y up; length: pixels of the longest
+    of them. A vector shorter than a tenth of the longest is drawn as a dot.
+    """
+    result = picture.copy()
+    longest = float(np.hypot(vectors[:, 0], vectors[:, 1]).max(initial=0.0))
+    if longest == 0.0:
+        return result
+    half = WIDTH * length / 2
+    for tail, vector in zip(tails, vectors * (length / longest), strict=True):
+        rim = _coverage(result.shape[:2], tail, vector, half, half * 0.9)
+        ink = _coverage(result.shape[:2], tail, vector, half, 0.0)
+        for (rows, columns, cover), paint in ((rim, (1.0, 1.0, 1.0)), (ink, colour)):
+            part = result[rows, columns]
+            part += cover[..., None] * (np.array(paint, np.float32) - part)
+    return result
+
+
+def grid(shape: Sequence[int], picture: Sequence[int], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`count` points across and as many down as keep the spacing: rows and columns of the cells (Y, X) they lie
+    in, and their places (N, 2) x, y in a picture (h, w), pixels from the lower left corner."""
+    down = max(1, round(count * shape[0] / shape[1]))
+    y, x = np.meshgrid((np.arange(down) + 0.5) / down, (np.arange(count) + 0.5) / count, indexing="ij")
+    rows, columns = (y * shape[0]).astype(int).ravel(), (x * shape[1]).astype(int).ravel()
+    places = np.stack([(columns + 0.5) * picture[1] / shape[1], (rows + 0.5) * picture[0] / shape[0]], axis=-1)
+    return rows, columns, places
+
+
+def _coverage(shape: Sequence[int], tail: np.ndarray, vector: np.ndarray, half: float, grown: float,
+              ) -> tuple[slice, slice, np.ndarray]:
+    """The window of a picture that an arrow touches (rows from the top), and how much of each pixel it covers."""
+    reach = float(np.hypot(*vector))
+    margin = 4 * half + grown + 2
+    x0, y0 = np.floor(np.minimum(tail, tail + vector) - margin).astype(int)
+    x1, y1 = np.ceil(np.maximum(tail, tail + vector) + margin).astype(int)
+    x0, x1 = np.clip([x0, x1], 0, shape[1])
+    y0, y1 = np.clip([y0, y1], 0, shape[0])
+    y, x = np.meshgrid(np.arange(y1 - 1, y0 - 1, -1) + 0.5 - tail[1], np.arange(x0, x1) + 0.5 - tail[0], indexing="ij")
+    if reach < 6 * half:
+        distance = np.hypot(x, y) - 1.6 * half
+    else:
+        along, across = (x * vector[0] + y * vector[1]) / reach, np.abs(x * vector[1] - y * vector[0]) / reach
+        neck = max(reach * (1 - HEAD), reach - 7 * half)
+        shaft = np.maximum(across - half, np.maximum(-along, along - neck))
+        slope = 3 * half / (reach - neck)  # half width of the head per pixel of its length
+        side = (across - (reach - along) * slope) / np.hypot(1.0, slope)
+        head = np.maximum(side, neck - along)
+        distance = np.minimum(shaft, head)
+    cover = np.clip(0.5 - (distance - grown), 0.0, 1.0).astype(np.float32)
+    return slice(shape[0] - y1, shape[0] - y0), slice(x0, x1), cover
