@@ -1,0 +1,53 @@
+// Assignment (ma09 §3.1, the "E-step" of [Kwatra 2005]): each output cell is the weighted average of the
+// matches that cover it, each match laid down in the local frame of its site.
+// -D RADIUS   half width of the neighbourhoods
+// -D SPACING  distance of the sites on their grid
+// -D FIRST    position of the first site
+// -D BORDER   cells by which the exemplar was continued toroidally on each side
+
+// Catmull-Rom: interpolates (exact at cells) and, unlike linear weights, does not blur between them
+inline float4 catmull_rom(float t) {
+    return 0.5f * (float4)(((2.0f - t) * t - 1.0f) * t, (3.0f * t - 5.0f) * t * t + 2.0f,
+                           ((4.0f - 3.0f * t) * t + 1.0f) * t, (t - 1.0f) * t * t);
+}
+
+inline float2 sample(__global const float2 *exemplar, int pitch, float2 at) {
+    const float2 low = floor(at);
+    const float4 wx = catmull_rom(at.x - low.x), wy = catmull_rom(at.y - low.y);
+    __global const float2 *e = exemplar + ((int)low.y - 1 + BORDER) * pitch + (int)low.x - 1 + BORDER;
+    float2 sum = wy.x * (wx.x * e[0] + wx.y * e[1] + wx.z * e[2] + wx.w * e[3]);
+    e += pitch;
+    sum += wy.y * (wx.x * e[0] + wx.y * e[1] + wx.z * e[2] + wx.w * e[3]);
+    e += pitch;
+    sum += wy.z * (wx.x * e[0] + wx.y * e[1] + wx.z * e[2] + wx.w * e[3]);
+    e += pitch;
+    return sum + wy.w * (wx.x * e[0] + wx.y * e[1] + wx.z * e[2] + wx.w * e[3]);
+}
+
+// exemplar continued by BORDER; position (S) where a site's match lies in it; weight (S); frame at the sites
+// (S); prior (Y, X) float2 with its weight in z (float4 for alignment): the frame before, warped
+__kernel void average(__global const float2 *exemplar, int pitch, __global const float2 *position,
+                      __global const float *weight, __global const float2 *axis, int2 grid, float falloff,
+                      __global const float4 *prior, __global float2 *out) {
+    const int x = get_global_id(0), y = get_global_id(1), width = get_global_size(0);
+    const float reach = 1.41421357f * RADIUS;
+    const int left = max(0, (int)ceil((x - reach - FIRST) / SPACING));
+    const int right = min(grid.x - 1, (int)floor((x + reach - FIRST) / SPACING));
+    const int bottom = max(0, (int)ceil((y - reach - FIRST) / SPACING));
+    const int top = min(grid.y - 1, (int)floor((y + reach - FIRST) / SPACING));
+    const float4 before = prior[y * width + x];
+    float2 sum = before.z * before.xy;
+    float total = before.z;
+    for (int gy = bottom; gy <= top; gy++)
+        for (int gx = left; gx <= right; gx++) {
+            const int s = gy * grid.x + gx;
+            const float2 way = (float2)(x - (gx * SPACING + FIRST), y - (gy * SPACING + FIRST));
+            const float2 e = axis[s];
+            const float2 o = (float2)(e.x * way.x + e.y * way.y, e.x * way.y - e.y * way.x);
+            if (max(fabs(o.x), fabs(o.y)) > RADIUS + 0.001f) continue;
+            const float w = weight[s] * exp(-falloff * dot(o, o));
+            sum += w * sample(exemplar, pitch, position[s] + o);
+            total += w;
+        }
+    out[y * width + x] = total > 0.0f ? sum / total : (float2)(0.0f);
+}

@@ -1,0 +1,51 @@
+"""Assignment (ma09 §3.1): every output cell becomes the weighted average of the matches that cover it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from synth import opencl
+
+# exponent of the robust error |x - z|^r that Kwatra 2005 §3.3 minimises by reweighting: r = 0.8
+ROBUST = 0.8
+# matches this close, as a share of the exemplar's rms, count as exact
+EXACT = 0.05
+# the weight of a match falls to this at the middle of its edges, so that no seam stands where it ends
+EDGE = 0.1
+
+
+def robust_weights(distance: np.ndarray, rms: float) -> np.ndarray:
+    """Weights in (0, 1] of matches with mean squared differences (S,) float32; one for an exact match."""
+    floor = np.float32((EXACT * rms) ** 2)
+    return (1 + distance / floor) ** np.float32(ROBUST / 2 - 1)
+
+
+def falloff(radius: int) -> np.float32:
+    """g in exp(-g |o|^2), the weight of a match at offset o from its centre."""
+    return np.float32(-np.log(EDGE) / max(radius, 1) ** 2)
+
+
+def continued(exemplar: np.ndarray, border: int) -> np.ndarray:
+    """The exemplar (N, M, 2) continued toroidally by `border` cells on each side."""
+    return np.pad(exemplar, ((border, border), (border, border), (0, 0)), mode="wrap")
+
+
+def average(exemplar: np.ndarray, position: Any, weight: np.ndarray, axis: Any, grid: tuple[int, int], radius: int,
+            spacing: int, prior: np.ndarray) -> np.ndarray:
+    """Least squares (Eq. 1): the minimum over x of sum_p w_p |x_p - z_p|^2 + w |x - prior|^2, cell by cell.
+
+    exemplar (N, M, 2); position (S, 2) device, where the matches' centres lie in it; weight (S,) float32;
+    axis (S, 2) device, the local x axis of each site; grid (rows, columns) of sites, `spacing` apart;
+    prior (Y, X, 4): x, y, weight, unused -> (Y, X, 2) float32.
+    """
+    border = radius + 3
+    program = opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=radius, SPACING=spacing, FIRST=spacing // 2,
+                             BORDER=border)
+    out = opencl.empty((*prior.shape[:2], 2))
+    program.average(prior.shape[1::-1], None, opencl.to_device(continued(exemplar, border)),
+                    np.int32(exemplar.shape[1] + 2 * border), position, opencl.to_device(weight), axis,
+                    np.array(grid[::-1], np.int32), falloff(radius), opencl.to_device(prior), out)
+    return out.get()

@@ -1,0 +1,165 @@
+"""Detail synthesis (ma09 §3.1, §3.4, §4 "Parameters", pseudocode 1 and 2): exemplar and coarse motion to H.
+
+Multi-resolution: at each level of a pyramid, from coarse to fine, neighbourhoods of 17², then of 9², are searched
+and assigned a few times over. Frames after the first start from the frame before, advected by L.
+
+    I  exemplar                 L  coarse motion           H  detail, in the exemplar's own coordinates
+    z  match of a neighbourhood x  output                  k  candidates a neighbour offers in k-coherence
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from synth import opencl, pyramid
+from synth.advect import advect
+from synth.motion import assignment, initialize, neighborhood
+from synth.motion.frames import local_frame
+from synth.motion.search import Matcher
+
+# each level is synthesized on the domain grown by this many cells, the radius of the widest neighbourhood, so
+# that neighbourhoods at its border are whole and what flows in is synthesized before it is seen
+MARGIN = 8
+# the coarsest exemplar level is no smaller than this: there a 17² neighbourhood sees a whole motif
+COARSEST = 8
+# mosaics tried for the first frame
+STARTS = 8
+# how strongly a frame holds to the one before, advected; one match that fits exactly counts one
+COHERENCE = 2.0
+
+
+@dataclass(frozen=True)
+class Settings:
+    """levels of the pyramid, widths of the neighborhoods in their order, iterations with each, search "exact" or
+    "k-coherence" with k candidates a neighbour."""
+
+    levels: int
+    neighborhoods: tuple[int, ...] = (17, 9)
+    iterations: int = 4
+    search: str = "exact"
+    k: int = 4
+
+
+def enough_levels(size: int) -> int:
+    """As many levels as bring an exemplar of `size` cells down to 8: with fewer, the coarsest neighbourhoods see
+    less than a closed motif on an empty ground, and the empty field becomes the best match of all."""
+    return max(1, int(np.log2(size / COARSEST)) + 1)
+
+
+@dataclass(frozen=True)
+class Level:
+    """What one level needs in every frame: its exemplar (N, M, 2) and a matcher for each neighbourhood."""
+
+    exemplar: np.ndarray
+    rms: float
+    settings: Settings
+
+    @cached_property
+    def matchers(self) -> list[Matcher]:
+        return [Matcher(neighborhood.space(self.exemplar, width // 2), self.exemplar.shape[:2], self.settings.k)
+                for width in self.settings.neighborhoods]
+
+    def optimize(self, H: np.ndarray, frame: np.ndarray, weight: float) -> tuple[np.ndarray, float]:
+        """Search and assign, round after round; returns H (Y, X, 2) and the mean distance of its last matches.
+
+        `weight` is that of H as it came (the frame before, warped): the O(x) of Eq. 1.
+        """
+        prior = np.concatenate([H, np.full_like(H, weight)], axis=-1)
+        distance = np.zeros(1, np.float32)
+        for matcher in self.matchers:
+            radius = matcher.space.radius
+            sites, grid, spacing = neighborhood.site_grid(H.shape[:2], 2 * radius + 1)
+            axis = opencl.to_device(frame[sites[:, 1], sites[:, 0]])
+            length = matcher.space.mean.size
+            match: Any = None
+            for _ in range(self.settings.iterations):
+                queries = matcher.space.project(H, frame, sites)
+                match, squared = self._search(matcher, queries, sites, axis, grid, match)
+                distance = squared.get() / length
+                weights = assignment.robust_weights(distance, self.rms)
+                H = assignment.average(self.exemplar, matcher.refine(queries, match), weights, axis, grid, radius,
+                                       spacing, prior)
+        return H, float(np.mean(np.sqrt(distance))) / self.rms
+
+    def _search(self, matcher: Matcher, queries: Any, sites: np.ndarray, axis: Any, grid: tuple[int, int],
+                match: Any) -> tuple[Any, Any]:
+        # k-coherence needs a match to begin with: the first round of each neighbourhood searches exactly
+        if self.settings.search == "exact" or match is None:
+            return matcher.exact(queries)
+        return matcher.coherent(queries, opencl.to_device(sites), axis, grid, match)
+
+
+class Synthesis:
+    """Synthesizes H frame by frame; `state` after a frame is all that the next one needs.
+
+    exemplar (N, M, 2) float32; shape (Y, X) of the output.
+    """
+
+    def __init__(self, exemplar: np.ndarray, shape: tuple[int, int], settings: Settings, seed: int):
+        rms = float(np.sqrt(np.mean(exemplar.astype(np.float64) ** 2)))
+        if rms == 0.0:
+            raise ValueError("the exemplar is zero everywhere")
+        self.levels = [Level(I, rms, settings) for I in pyramid.pyramid(exemplar, settings.levels, toroidal=True)]
+        self.shape, self.seed = shape, seed
+
+    def frame(self, L: np.ndarray, state: list[np.ndarray] | None) -> list[np.ndarray]:
+        """The state after the frame with coarse motion L (Y, X, 2) cells per frame; None before the first.
+
+        A state holds H of each level, coarsest first, with its margin.
+        """
+        motions = [np.pad(motion / np.float32(2 ** (len(self.levels) - 1 - i)),
+                          ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="edge")
+                   for i, motion in enumerate(pyramid.pyramid(L, len(self.levels), toroidal=False))]
+        frames = [local_frame(motion) for motion in motions]
+        if state is None:
+            done = [self._start(frames[0])]
+            for level, frame in zip(self.levels[1:], frames[1:], strict=True):
+                done.append(level.optimize(_finer(done[-1], frame.shape[:2]), frame, 0.0)[0])
+            return done
+        warped = [advect(H, motion) for H, motion in zip(state, motions, strict=True)]
+        done = [self.levels[0].optimize(warped[0], frames[0], COHERENCE)[0]]
+        for i in range(1, len(self.levels)):
+            # what the coarser level changed, on top of what flowed here
+            change = _finer(done[-1] - warped[i - 1], warped[i].shape[:2])
+            done.append(self.levels[i].optimize(warped[i] + change, frames[i], COHERENCE)[0])
+        return done
+
+    def visible(self, state: list[np.ndarray]) -> np.ndarray:
+        """H (Y, X, 2) of a state, without its margin."""
+        return np.ascontiguousarray(state[-1][MARGIN:-MARGIN, MARGIN:-MARGIN])
+
+    def _start(self, frame: np.ndarray) -> np.ndarray:
+        """The coarsest level of the first frame: the best of several mosaics after optimization."""
+        level = self.levels[0]
+        rms = np.sqrt(np.mean(level.exemplar**2))
+        best, least = None, np.inf
+        for start in range(STARTS):
+            random = np.random.Generator(np.random.Philox(key=[self.seed, start]))
+            H, distance = level.optimize(initialize.mosaic(level.exemplar, frame, random), frame, 0.0)
+            inside = H[MARGIN:-MARGIN, MARGIN:-MARGIN]
+            # the distance alone would choose the emptiest
+            score = distance + abs(np.sqrt(np.mean(inside**2)) / rms - 1)
+            if score < least:
+                best, least = H, score
+        assert best is not None
+        return best
+
+
+def _finer(H: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """H of one level, with margin, at the cells of the next finer one of `shape`, with margin."""
+    return pyramid.resample(H, shape, (MARGIN / 2 - 0.25,) * 2, 0.5)
+
+
+def synthesize(exemplar: np.ndarray, motion: Iterable[np.ndarray], shape: tuple[int, int], settings: Settings,
+               seed: int) -> Iterator[np.ndarray]:
+    """H (Y, X, 2) for each frame of coarse motion L (Y, X, 2), cells per frame at the output's resolution."""
+    synthesis = Synthesis(exemplar, shape, settings, seed)
+    state = None
+    for L in motion:
+        state = synthesis.frame(L, state)
+        yield synthesis.visible(state)

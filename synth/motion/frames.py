@@ -1,0 +1,28 @@
+"""Local frames of the coarse motion, and the coordinate transformation (ma09 §3.1 figure 2, §3.3)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Below this share of the field's rms the direction of L is noise; the frame turns to the fallback smoothly.
+STILL = 1e-3
+
+
+def local_frame(L: np.ndarray) -> np.ndarray:
+    """The local x axis: unit vectors along L (Y, X, 2), as (Y, X, 2) float32; the y axis is 90 degrees on.
+
+    In 2D the frame is completely defined by L (§3.3). Where L rests it falls back on the x axis of the domain.
+    """
+    rms = float(np.sqrt(np.mean(np.sum(L.astype(np.float64) ** 2, axis=-1))))
+    if rms == 0.0:
+        return np.broadcast_to(np.float32([1, 0]), L.shape).copy()
+    frame = L / rms + np.float32([STILL, 0])
+    length = np.linalg.norm(frame, axis=-1, keepdims=True)
+    return np.where(length > 1e-12, frame / np.maximum(length, 1e-12), np.float32([1, 0])).astype(np.float32)
+
+
+def to_world(H: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """H' = R H: detail (Y, X, 2) from exemplar coordinates to those of the domain (§3.1, CoordinateTransform)."""
+    x = frame[..., 0] * H[..., 0] - frame[..., 1] * H[..., 1]
+    y = frame[..., 1] * H[..., 0] + frame[..., 0] * H[..., 1]
+    return np.stack([x, y], axis=-1)

@@ -1,0 +1,121 @@
+"""Neighbourhoods: where they stand, what they see, and the small space they are compared in.
+
+The output is covered by a sparse grid of neighbourhoods, one every quarter of their width [Kwatra 2005 §3.2].
+Each is sampled in the local frame of the coarse motion (ma09 §3.3) and projected on the principal components
+of the exemplar's own neighbourhoods, where its best match is searched (ma09 §3.1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+from threadpoolctl import threadpool_limits
+
+from synth import opencl
+
+VARIANCE_KEPT = 0.995
+MOST_DIMS = 64
+
+
+def site_grid(shape: tuple[int, int], width: int) -> tuple[np.ndarray, tuple[int, int], int]:
+    """Centres of the neighbourhoods: ((S, 2) int32 as x, y; grid size (rows, columns); spacing in cells)."""
+    spacing = max(1, width // 4)
+    ys = np.arange(spacing // 2, shape[0], spacing)
+    xs = np.arange(spacing // 2, shape[1], spacing)
+    grid = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2).astype(np.int32)
+    return grid, (len(ys), len(xs)), spacing
+
+
+def exemplar_patches(exemplar: np.ndarray, radius: int) -> np.ndarray:
+    """All toroidal neighbourhoods of an exemplar (N, M, 2): (N * M, (2r+1)^2 * 2) float32, row by row."""
+    rows, columns = exemplar.shape[:2]
+    padded = np.pad(exemplar, ((radius, radius), (radius, radius), (0, 0)), mode="wrap")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * radius + 1, 2 * radius + 1), axis=(0, 1))
+    return np.ascontiguousarray(windows.transpose(0, 1, 3, 4, 2)).reshape(rows * columns, -1)
+
+
+def gather_reference(field: np.ndarray, frame: np.ndarray, sites: np.ndarray, radius: int) -> np.ndarray:
+    """Specification of the kernel `gather`: field sampled bilinearly, clamped, at site + R(frame) (i, j).
+
+    field, frame (Y, X, 2) float32; sites (S, 2) int32 as x, y -> (S, (2r+1)^2 * 2) float32.
+    """
+    span = np.arange(-radius, radius + 1, dtype=np.float32)
+    j, i = np.meshgrid(span, span, indexing="ij")
+    e = frame[sites[:, 1], sites[:, 0]][:, :, None, None]
+    x = np.clip(sites[:, 0, None, None] + e[:, 0] * i - e[:, 1] * j, 0, field.shape[1] - 1).astype(np.float32)
+    y = np.clip(sites[:, 1, None, None] + e[:, 1] * i + e[:, 0] * j, 0, field.shape[0] - 1).astype(np.float32)
+    x0 = np.minimum(x.astype(int), max(field.shape[1] - 2, 0))
+    y0 = np.minimum(y.astype(int), max(field.shape[0] - 2, 0))
+    x1, y1 = np.minimum(x0 + 1, field.shape[1] - 1), np.minimum(y0 + 1, field.shape[0] - 1)
+    tx, ty = (x - x0)[..., None], (y - y0)[..., None]
+    low = (1 - tx) * field[y0, x0] + tx * field[y0, x1]
+    high = (1 - tx) * field[y1, x0] + tx * field[y1, x1]
+    return ((1 - ty) * low + ty * high).reshape(len(sites), -1).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Space:
+    """The PCA space of an exemplar's neighbourhoods of one radius.
+
+    mean (C,), basis (C, D) with C = (2r+1)^2 * 2 and D a multiple of 16 (zero columns fill it up);
+    points (N * M, D): the exemplar's own neighbourhoods in it. All float32.
+    """
+
+    radius: int
+    mean: np.ndarray
+    basis: np.ndarray
+    points: np.ndarray
+
+    @property
+    def dims(self) -> int:
+        return self.basis.shape[1]
+
+    def project(self, field: np.ndarray, frame: np.ndarray, sites: np.ndarray) -> Any:
+        """Oriented neighbourhoods of field (Y, X, 2) at sites (S, 2), in this space: device array (S, D)."""
+        count, side = len(sites), 2 * self.radius + 1
+        program = opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=self.radius, DIMS=self.dims)
+        patches = opencl.empty((count, side * side * 2))
+        size = np.array([field.shape[1], field.shape[0]], np.int32)
+        program.gather((side * side, count), None, opencl.to_device(field), opencl.to_device(frame), size,
+                       opencl.to_device(sites), patches)
+        out = opencl.empty((count, self.dims))
+        program.project((self.dims // 16, -(-count // 4)), None, patches, opencl.to_device(self.mean),
+                        opencl.to_device(self.basis), np.int32(count), out)
+        return out
+
+    def project_reference(self, patches: np.ndarray) -> np.ndarray:
+        """Specification of the kernel `project`: patches (S, C) -> (S, D) float32."""
+        return ((patches - self.mean) @ self.basis).astype(np.float32)
+
+
+def space(exemplar: np.ndarray, radius: int) -> Space:
+    """Principal components of the toroidal neighbourhoods of exemplar (N, M, 2), ordered by variance.
+
+    Keeps as many as hold 99.5 % of the variance, 64 at most. One thread of BLAS: its sums, and with them
+    the basis, would otherwise depend on the number of threads.
+    """
+    patches = exemplar_patches(exemplar, radius)
+    mean = patches.mean(axis=0, dtype=np.float64)
+    centred = patches - mean
+    with threadpool_limits(1):
+        # the smaller of the two Gram matrices has the same spectrum
+        tall = len(centred) >= centred.shape[1]
+        gram = centred.T @ centred if tall else centred @ centred.T
+        most = min(MOST_DIMS, len(gram))
+        values, vectors = eigh(gram, subset_by_index=(len(gram) - most, len(gram) - 1))
+        values, vectors = np.maximum(values[::-1], 0), vectors[:, ::-1]
+        share = np.cumsum(values) / max(np.trace(gram), np.finfo(float).tiny)
+        kept = min(most, int(np.searchsorted(share, VARIANCE_KEPT)) + 1)
+        vectors = vectors[:, :kept]
+        if not tall:
+            vectors = centred.T @ vectors
+            vectors /= np.maximum(np.linalg.norm(vectors, axis=0), np.finfo(float).tiny)
+        dims = -(-kept // 16) * 16
+        basis = np.zeros((patches.shape[1], dims), np.float32)
+        basis[:, :kept] = vectors
+        points = (centred @ basis.astype(np.float64)).astype(np.float32)
+    return Space(radius, mean.astype(np.float32), basis, points)

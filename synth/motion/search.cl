@@ -1,0 +1,129 @@
+// Best matches in PCA space (ma09 §3.1 exact, §3.7 k-coherence).
+// -D DIMS   dimensions of the space, a multiple of 16
+// -D BLOCK  queries a work-item treats together
+
+#define HUGE_DISTANCE 3.0e38f
+
+// Brute force: sixteen exemplar points to a vector lane, BLOCK queries to a work-item, so that every load of
+// the exemplar serves BLOCK fused multiply-adds. With half = |e|^2 / 2, |q - e|^2 = |q|^2 + 2 (half - q.e).
+// points (DIMS, padded) transposed; half (padded), huge in the padding; queries (count, DIMS)
+__kernel void exact(__global const float *points, __global const float *half_norm, int padded,
+                    __global const float *queries, int count, __global int *best, __global float *distance) {
+    const int first = get_global_id(0) * BLOCK;
+    float16 least[BLOCK];
+    int16 where[BLOCK];
+    __global const float *q[BLOCK];
+    for (int b = 0; b < BLOCK; b++) {
+        least[b] = (float16)(HUGE_DISTANCE);
+        where[b] = (int16)(0);
+        q[b] = queries + min(first + b, count - 1) * DIMS;
+    }
+    for (int e = 0; e < padded; e += 32) {
+        float16 left[BLOCK], right[BLOCK];
+        for (int b = 0; b < BLOCK; b++) {
+            left[b] = vload16(0, half_norm + e);
+            right[b] = vload16(0, half_norm + e + 16);
+        }
+        for (int d = 0; d < DIMS; d++) {
+            const float16 x = vload16(0, points + d * padded + e);
+            const float16 y = vload16(0, points + d * padded + e + 16);
+            for (int b = 0; b < BLOCK; b++) {
+                left[b] = fma((float16)(-q[b][d]), x, left[b]);
+                right[b] = fma((float16)(-q[b][d]), y, right[b]);
+            }
+        }
+        for (int b = 0; b < BLOCK; b++) {
+            int16 closer = left[b] < least[b];
+            least[b] = select(least[b], left[b], closer);
+            where[b] = select(where[b], (int16)(e), closer);
+            closer = right[b] < least[b];
+            least[b] = select(least[b], right[b], closer);
+            where[b] = select(where[b], (int16)(e + 16), closer);
+        }
+    }
+    for (int b = 0; b < BLOCK && first + b < count; b++) {
+        float lanes[16];
+        int starts[16];
+        vstore16(least[b], 0, lanes);
+        vstore16(where[b], 0, starts);
+        float value = lanes[0], norm = 0.0f;
+        int index = starts[0];
+        // equal distances go to the lowest index, whatever lane they were seen in
+        for (int lane = 1; lane < 16; lane++) {
+            const int at = starts[lane] + lane;
+            if (lanes[lane] < value || (lanes[lane] == value && at < index)) {
+                value = lanes[lane];
+                index = at;
+            }
+        }
+        for (int d = 0; d < DIMS; d++) norm = fma(q[b][d], q[b][d], norm);
+        best[first + b] = index;
+        distance[first + b] = max(0.0f, norm + 2.0f * value);
+    }
+}
+
+inline float squared_distance(__global const float *a, __global const float *b) {
+    float16 sum = (float16)(0.0f);
+    for (int d = 0; d < DIMS; d += 16) {
+        const float16 difference = vload16(0, a + d) - vload16(0, b + d);
+        sum = fma(difference, difference, sum);
+    }
+    const float8 s8 = sum.lo + sum.hi;
+    const float4 s4 = s8.lo + s8.hi;
+    return (s4.x + s4.y) + (s4.z + s4.w);
+}
+
+inline int wrapped(int x, int y, int2 exemplar) {
+    x %= exemplar.x;
+    y %= exemplar.y;
+    return (y < 0 ? y + exemplar.y : y) * exemplar.x + (x < 0 ? x + exemplar.x : x);
+}
+
+// k-coherence [Tong 2002; Han 2006]: the candidates of a site are the k most similar neighbourhoods of what
+// its 3 x 3 neighbouring sites matched, each shifted by the way from that site in this one's local frame.
+// points (N * M, DIMS); similar (N * M, K), each row beginning with itself; match (count) of the last search
+__kernel void coherent(__global const float *points, __global const int *similar, int2 exemplar,
+                       __global const float *queries, __global const int2 *sites, __global const float2 *axis,
+                       int2 grid, __global const int *match, __global int *best, __global float *distance) {
+    const int gx = get_global_id(0), gy = get_global_id(1), s = gy * grid.x + gx;
+    const float2 e = axis[s];
+    float least = HUGE_DISTANCE;
+    int index = 0;
+    for (int dy = -1; dy <= 1; dy++)
+        for (int dx = -1; dx <= 1; dx++) {
+            const int nx = gx + dx, ny = gy + dy;
+            if (nx < 0 || ny < 0 || nx >= grid.x || ny >= grid.y) continue;
+            const int n = ny * grid.x + nx;
+            const float2 way = convert_float2(sites[s] - sites[n]);
+            const int i = convert_int_rte(e.x * way.x + e.y * way.y);
+            const int j = convert_int_rte(e.x * way.y - e.y * way.x);
+            const int centre = wrapped(match[n] % exemplar.x + i, match[n] / exemplar.x + j, exemplar);
+            for (int k = 0; k < CANDIDATES; k++) {
+                const int candidate = similar[centre * CANDIDATES + k];
+                const float d = squared_distance(queries + s * DIMS, points + candidate * DIMS);
+                if (d < least || (d == least && candidate < index)) {
+                    least = d;
+                    index = candidate;
+                }
+            }
+        }
+    best[s] = index;
+    distance[s] = least;
+}
+
+// Sub-cell position of the match: along each axis the minimum of the parabola through three distances.
+__kernel void refine(__global const float *points, int2 exemplar, __global const float *queries,
+                     __global const int *best, __global float2 *position) {
+    const int s = get_global_id(0), x = best[s] % exemplar.x, y = best[s] / exemplar.x;
+    __global const float *q = queries + s * DIMS;
+    const float here = squared_distance(q, points + best[s] * DIMS);
+    const float west = squared_distance(q, points + wrapped(x - 1, y, exemplar) * DIMS);
+    const float east = squared_distance(q, points + wrapped(x + 1, y, exemplar) * DIMS);
+    const float south = squared_distance(q, points + wrapped(x, y - 1, exemplar) * DIMS);
+    const float north = squared_distance(q, points + wrapped(x, y + 1, exemplar) * DIMS);
+    const float2 slope = (float2)(west - east, south - north);
+    const float2 bend = (float2)(west + east, south + north) - 2.0f * here;
+    float2 shift = (float2)(bend.x > 0.0f ? 0.5f * slope.x / bend.x : 0.0f,
+                            bend.y > 0.0f ? 0.5f * slope.y / bend.y : 0.0f);
+    position[s] = (float2)(x, y) + clamp(shift, -0.5f, 0.5f);
+}

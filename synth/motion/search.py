@@ -1,0 +1,119 @@
+"""Search (ma09 §3.1 and §3.7): the best match of each output neighbourhood among the exemplar's own.
+
+Exact search compares with all of them; k-coherence only with what the neighbouring sites suggest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from synth import opencl
+from synth.motion.neighborhood import Space
+
+QUERIES_TOGETHER = 8
+
+
+def exact_reference(points: np.ndarray, queries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Specification of `exact`: nearest of points (E, D) to each of queries (S, D); (S,) index and squared distance."""
+    norms = (queries.astype(np.float64) ** 2).sum(1)[:, None] + (points.astype(np.float64) ** 2).sum(1)
+    squared = norms - 2 * queries.astype(np.float64) @ points.T.astype(np.float64)
+    best = squared.argmin(axis=1)
+    return best, np.maximum(squared[np.arange(len(best)), best], 0)
+
+
+def coherent_reference(points: np.ndarray, similar: np.ndarray, exemplar: tuple[int, int], queries: np.ndarray,
+                       sites: np.ndarray, axis: np.ndarray, grid: tuple[int, int],
+                       match: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Specification of `coherent`; arguments as in `Matcher.coherent`, exemplar and grid as (rows, columns)."""
+    rows, columns = grid
+    best, distance = np.zeros(len(sites), int), np.zeros(len(sites))
+    for s in range(len(sites)):
+        gy, gx = divmod(s, columns)
+        candidates: set[int] = set()
+        for n in (y * columns + x for y in range(max(gy - 1, 0), min(gy + 2, rows))
+                  for x in range(max(gx - 1, 0), min(gx + 2, columns))):
+            way = (sites[s] - sites[n]).astype(np.float32)
+            i = int(np.rint(axis[s, 0] * way[0] + axis[s, 1] * way[1]))
+            j = int(np.rint(axis[s, 0] * way[1] - axis[s, 1] * way[0]))
+            y, x = divmod(int(match[n]), exemplar[1])
+            candidates.update(similar[(y + j) % exemplar[0] * exemplar[1] + (x + i) % exemplar[1]].tolist())
+        choice = np.array(sorted(candidates))
+        squared = ((queries[s] - points[choice]).astype(np.float64) ** 2).sum(1)
+        best[s], distance[s] = choice[squared.argmin()], squared.min()
+    return best, distance
+
+
+@dataclass(frozen=True)
+class Matcher:
+    """Searches the space of an exemplar of size `exemplar` (rows, columns) on the device."""
+
+    space: Space
+    exemplar: tuple[int, int]
+    candidates: int
+
+    @cached_property
+    def _program(self) -> Any:
+        return opencl.program(Path(__file__).with_suffix(".cl"), DIMS=self.space.dims, BLOCK=QUERIES_TOGETHER,
+                              CANDIDATES=self.candidates)
+
+    @cached_property
+    def _points(self) -> Any:
+        return opencl.to_device(self.space.points)
+
+    @cached_property
+    def _transposed(self) -> tuple[Any, Any, np.int32]:
+        count = len(self.space.points)
+        padded = -(-count // 32) * 32
+        points = np.zeros((self.space.dims, padded), np.float32)
+        points[:, :count] = self.space.points.T
+        half = np.full(padded, 1e30, np.float32)
+        half[:count] = 0.5 * (self.space.points.astype(np.float64) ** 2).sum(1)
+        return opencl.to_device(points), opencl.to_device(half), np.int32(padded)
+
+    @cached_property
+    def _similar(self) -> Any:
+        return opencl.to_device(similar_sets(self.space.points, self.candidates))
+
+    @property
+    def _size(self) -> np.ndarray:
+        return np.array(self.exemplar[::-1], np.int32)
+
+    def exact(self, queries: Any) -> tuple[Any, Any]:
+        """Nearest neighbourhoods to device queries (S, D): device (S,) int32 index, (S,) float32 squared distance."""
+        count = queries.shape[0]
+        best, distance = opencl.empty(count, np.int32), opencl.empty(count)
+        points, half, padded = self._transposed
+        self._program.exact((-(-count // QUERIES_TOGETHER),), (1,), points, half, padded, queries, np.int32(count),
+                            best, distance)
+        return best, distance
+
+    def coherent(self, queries: Any, sites: Any, axis: Any, grid: tuple[int, int], match: Any) -> tuple[Any, Any]:
+        """Best k-coherent candidates; match (S,) int32 is the last search's result on the same sites."""
+        count = queries.shape[0]
+        best, distance = opencl.empty(count, np.int32), opencl.empty(count)
+        self._program.coherent(grid[::-1], None, self._points, self._similar, self._size, queries, sites, axis,
+                               np.array(grid[::-1], np.int32), match, best, distance)
+        return best, distance
+
+    def refine(self, queries: Any, best: Any) -> Any:
+        """Sub-cell positions (S, 2) float32 (x, y) of matches in the exemplar."""
+        position = opencl.empty((queries.shape[0], 2))
+        self._program.refine((queries.shape[0],), None, self._points, self._size, queries, best, position)
+        return position
+
+
+def similar_sets(points: np.ndarray, k: int) -> np.ndarray:
+    """For each of points (E, D) the k nearest, itself first: (E, k) int32; equal distances in order of index."""
+    from scipy.spatial import cKDTree
+
+    _, index = cKDTree(points).query(points, k=min(k, len(points)))
+    index = index.reshape(len(points), -1).astype(np.int32)
+    own = np.arange(len(points), dtype=np.int32)[:, None]
+    # among identical neighbourhoods the tree may name another one first
+    others = np.where(index == own, index[:, :1], index)
+    return np.ascontiguousarray(np.concatenate([own, others[:, 1:]], axis=1)) if k > 1 else own
