@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,13 +88,21 @@ def proofs(works: stages.Works) -> Iterator[Proof]:
     """One proof for each different picture among the variants; none of a scene that renders no smoke."""
     for variant in works.makers("beauty"):
         scene = works.scenes.variants[variant]
-        small = {"width": PROOF_WIDTH, "spp": PROOF_SAMPLES}
-        render = scene.render.model_copy(update={k: v for k, v in small.items() if hasattr(scene.render, k)})
+        render = proof_settings(scene.render)
         product, frame = works.products[variant]["beauty"], shown_frame(scene)
         made = product.make(scene.model_copy(update={"render": render}), _Stock(works, variant), [frame])
         folder = works.file(variant, "beauty", frame).parent.relative_to(works.root)
         light = np.asarray(next(made)[1], np.float32)
         yield Proof((folder / PROOF).as_posix(), light, made_with(render.kind))
+
+
+def proof_settings(render: Any) -> Any:
+    """A scene's [render] table at the size and samples of a proof."""
+    width = min(PROOF_WIDTH, render.width)
+    small: dict[str, Any] = {"width": width}
+    if render.kind == "volume":
+        small |= {"height": round(render.height * width / render.width), "spp": PROOF_SAMPLES}
+    return render.model_copy(update=small)
 
 
 class _Stock:
@@ -108,6 +117,9 @@ class _Stock:
 
     def own(self, frame: int) -> Any | None:
         return None
+
+    def key(self, frame: int) -> str:
+        return ""
 
     @property
     def work(self) -> Path:
@@ -149,7 +161,7 @@ def write(scene_file: Path, out: Path, progress: Progress) -> str:
     """
     works = baked(scene_file, out, progress)
     folder = folder_of(scene_file)
-    record: dict[str, Any] = {"scene": scene_file.stem, "sums": {}, "proofs": {}, "files": {}}
+    record: dict[str, dict[str, Any]] = {"sums": {}, "proofs": {}, "files": {}}
     kept: dict[str, bytes] = {}
     for made in contents(works):
         record["sums"][made.path] = sums(made.values(made.file))
@@ -157,11 +169,9 @@ def write(scene_file: Path, out: Path, progress: Progress) -> str:
             kept[made.path] = made.file.read_bytes()
     for proof in proofs(works):
         record["proofs"][proof.path] = proof.made_with
-        draft = works.root / "diff" / proof.path
-        images.write_picture(draft, proof.light)
-        kept[proof.path] = draft.read_bytes()
+        kept[proof.path] = _exr(proof.light)
     record["files"] = {path: hashlib.sha256(content).hexdigest() for path, content in kept.items()}
-    text = json.dumps(record, indent=1) + "\n"
+    text = _spelled(record)
     if (folder / RECORD).is_file() and (folder / RECORD).read_text() == text:
         return f"{scene_file.stem}: unchanged"
     for path, content in kept.items():
@@ -174,12 +184,29 @@ def write(scene_file: Path, out: Path, progress: Progress) -> str:
     return f"{scene_file.stem}: {len(kept)} files, {megabytes:.1f} MB, kept in {folder}"
 
 
-def record_of(scene_file: Path) -> dict[str, Any]:
+def _exr(light: np.ndarray) -> bytes:
+    """Linear light (h, w, 3) as the content of a float EXR file."""
+    with tempfile.TemporaryDirectory(prefix="flowloom-proof-") as folder:
+        file = Path(folder) / PROOF
+        images.write_picture(file, light)
+        return file.read_bytes()
+
+
+def _spelled(record: dict[str, dict[str, Any]]) -> str:
+    """The record as JSON, one line for each file: a review of a changed reference shows which changed."""
+    tables = []
+    for name, table in record.items():
+        lines = (f"  {json.dumps(path)}: {json.dumps(value)}" for path, value in table.items())
+        tables.append(f" {json.dumps(name)}: {{\n" + ",\n".join(lines) + "\n }")
+    return "{\n" + ",\n".join(tables) + "\n}\n"
+
+
+def record_of(scene_file: Path) -> dict[str, dict[str, Any]]:
     """The record of a scene's reference, its files checked; BadInput if there is none or it is damaged."""
     folder = folder_of(scene_file)
     mending = f"type: flowloom references {scene_file}"
     try:
-        record: dict[str, Any] = json.loads((folder / RECORD).read_text())
+        record: dict[str, dict[str, Any]] = json.loads((folder / RECORD).read_text())
         damaged = [path for path, sha256 in record["files"].items() if sha256 != _sha256(folder / path)]
     except FileNotFoundError as error:
         missing = Path(error.filename).relative_to(folder)

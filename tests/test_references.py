@@ -1,0 +1,155 @@
+"""References and diff of a whole small scene: kept, found the same, found different, missing, damaged."""
+
+import json
+import shutil
+
+import pytest
+
+from pipeline import diff, references
+from pipeline.errors import BadInput
+from pipeline.progress import Progress
+
+SCENE = """
+title = "A heart in the wind"
+seed = 3
+frames = 3
+[exemplar]
+kind = "heart"
+size = 16
+[coarse]
+kind = "curl-noise"
+size = [16, 16]
+[detail]
+size = [256, 256]
+[combine]
+omega = 1.0
+[density]
+m = 2
+[[density.sources]]
+centre = [0.0, 0.5]
+radius = 0.3
+[render]
+kind = "lit"
+width = 64
+[quick]
+"detail.size" = [32, 32]
+"""
+
+
+def check(folder):
+    return diff.check(folder / "wind.toml", folder / "out", Progress(quiet=True))
+
+
+def keep(folder):
+    return references.write(folder / "wind.toml", folder / "out", Progress(quiet=True))
+
+
+def change(folder, old, new):
+    text = (folder / "wind.toml").read_text()
+    assert old in text
+    (folder / "wind.toml").write_text(text.replace(old, new))
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A scene made, and its reference."""
+    folder = tmp_path_factory.mktemp("kept")
+    (folder / "wind.toml").write_text(SCENE)
+    assert "kept in" in keep(folder)
+    return folder
+
+
+@pytest.fixture
+def scene(kept, tmp_path):
+    """A copy of the scene, of what it made and of its reference."""
+    return shutil.copytree(kept, tmp_path / "scene")
+
+
+def test_reference_is_small_and_says_what_it_is(kept):
+    folder = kept / "references" / "wind"
+    record = json.loads((folder / "reference.json").read_text())
+    files = {p.relative_to(folder).as_posix() for p in folder.rglob("*.exr")}
+    assert files == set(record["files"]) == {
+        "fields/exemplar.exr", "fields/L.0003.exr", "fields/H.0003.exr", "geometry/F.0003.exr",
+        "geometry/density.0003.exr", "images/proof.exr"}
+    assert {f"geometry/density.000{n}.exr" for n in (1, 2, 3)} < set(record["sums"])
+    assert record["sums"]["fields/H.0001.exr"]["shape"] == [32, 32, 2]  # at the quick settings
+    assert set(record["proofs"]["images/proof.exr"]) == {"numpy", "scipy"}
+    assert sum(p.stat().st_size for p in folder.rglob("*") if p.is_file()) < 200_000
+
+
+def test_volume_proofs_name_what_renders_them():
+    versions = references.made_with("volume")
+    assert {"variant", "mitsuba", "drjit"} <= set(versions) and versions["mitsuba"] == "3.9.1"
+
+
+def test_unchanged_scene_is_the_same(scene):
+    assert check(scene) == []
+    page = scene / "out" / "quick" / "wind" / "diff" / "index.html"
+    assert "comparisons are the same" in page.read_text()
+    shutil.rmtree(scene / "out")  # made anew from the scene
+    assert check(scene) == []
+
+
+def test_keeping_the_same_again_touches_nothing(scene):
+    before = {p: p.stat().st_mtime_ns for p in (scene / "references").rglob("*")}
+    assert keep(scene) == "wind: unchanged"
+    assert {p: p.stat().st_mtime_ns for p in (scene / "references").rglob("*")} == before
+
+
+def test_one_per_cent_denser_smoke_differs(scene):
+    change(scene, "radius = 0.3", "radius = 0.3\nlevel = 0.99")
+    lines = check(scene)
+    densities = [f"geometry/density.000{n}.exr" for n in (1, 2, 3)]
+    assert [line.split(": ")[1] for line in lines[:-1]] == [*densities, "images/proof.exr"]
+    assert "sums 0.01 apart" in lines[0] and "largest difference 0.01" in lines[2] and "pixels" in lines[3]
+    assert "index.html" in lines[-1] and "flowloom references" in lines[-1]
+    assert "4 of" in (scene / "out" / "quick" / "wind" / "diff" / "index.html").read_text()
+    assert "kept in" in keep(scene) and check(scene) == []  # it was meant
+
+
+def test_another_seed_differs_from_the_fields_on(scene):
+    change(scene, "seed = 3", "seed = 4")
+    named = " ".join(check(scene))
+    assert all(name in named for name in ("L.0001", "H.0001", "F.0001", "density.0001", "proof"))
+    assert "exemplar.exr" not in named
+
+
+def test_other_products_are_told(scene):
+    change(scene, "[quick]", '[variants.a]\n[variants.b]\n"density.m" = 1\n[quick]')
+    lines = check(scene)
+    assert any("geometry/b/density.0003.exr: is new" in line for line in lines)
+    assert any("geometry/density.0003.exr: is no longer made" in line for line in lines)
+    keep(scene)
+    assert check(scene) == []
+    assert not (scene / "references" / "wind" / "geometry" / "density.0003.exr").exists()
+
+
+def test_another_version_is_named_with_the_difference(scene):
+    file = scene / "references" / "wind" / "reference.json"
+    record = json.loads(file.read_text())
+    record["proofs"]["images/proof.exr"]["scipy"] = "1.0"
+    file.write_text(json.dumps(record))
+    assert check(scene) == []  # a version alone is no difference
+    change(scene, "radius = 0.3", "radius = 0.31")
+    assert any("since then scipy 1.0 became" in line for line in check(scene))
+
+
+def test_missing_reference_says_what_to_type(scene):
+    shutil.rmtree(scene / "references")
+    with pytest.raises(BadInput, match=r"has no reference .*type: flowloom references .*wind\.toml"):
+        check(scene)
+
+
+@pytest.mark.parametrize("name", ["reference.json", "fields/H.0003.exr", "images/proof.exr"])
+def test_damaged_reference_is_not_compared_with(scene, name):
+    file = scene / "references" / "wind" / name
+    file.write_bytes(file.read_bytes()[:-9])
+    with pytest.raises(BadInput, match="is damaged; check it out anew, or type: flowloom references"):
+        check(scene)
+
+
+def test_references_of_the_project_stand_with_its_tests():
+    project = references.PROJECT_SCENES.parent
+    folder = references.folder_of(project / "scenes" / "ma09-fig01.toml")
+    assert folder == project / "tests" / "references" / "ma09-fig01"
