@@ -8,6 +8,8 @@ for `ink`.
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, lic, studio
+from render import backend, denoise, lic, studio
 
 # The lit sheet. Lengths are shares of the picture's height, so a scene looks the same at any width.
 LAYERS = 20  # front to back
@@ -39,10 +41,12 @@ PAPER = np.array([0.965, 0.952, 0.925], np.float32)
 PAPER_GRAIN = 0.012  # deviation of the paper's tone
 
 # The volume.
-SMOKE_ALBEDO = (0.955, 0.96, 0.968)
+SMOKE_ALBEDO = (0.90, 0.905, 0.915)
 SMOKE_FORWARD = 0.2  # mean cosine of the scattering angle
-MAX_DEPTH = 48
+MAX_DEPTH = 32  # bounces; what is left after them is 3 % of the light
 MOST_DENSITY = 1e3  # delta tracking steps by the largest extinction: one cell of 1e8 takes for ever
+STAGE_SPP = 128  # for the empty stage: a guide must not be noisy
+FARTHEST = 1e3  # stands for a ray that meets nothing
 MOST_SAMPLES = 2**30  # in one pass; Mitsuba's memory explodes above 2^32
 
 
@@ -217,16 +221,17 @@ class VolumeSettings:
     """How `volume` looks at a density. Lengths in world units.
 
     extinction: per world unit at density 1; spp: paths per pixel; bowl: (radius, height) of the bowl that the
-    plume rises from, None for none.
+    plume rises from, None for none; denoised: fit the paths to guides without noise (`render.denoise`).
     """
 
     width: int = 512
     height: int = 640
     spp: int = 64
     seed: int = 1
-    extinction: float = 60.0
+    extinction: float = 80.0
     bowl: tuple[float, float] | None = None
     camera: studio.Camera = studio.CAMERA
+    denoised: bool = True
 
 
 def active_box(density: np.ndarray) -> tuple[slice, slice, slice]:
@@ -250,10 +255,33 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
     if density.max() > MOST_DENSITY:
         raise ValueError(f"a density of {density.max():g} is too much to render (at most {MOST_DENSITY:g})")
     mi = backend.mitsuba("scalar_rgb")
-    scene = _stage(mi, settings) | _lights(mi)
+    scene = _studio(mi, settings.bowl)
     if density.any():
         scene["smoke"] = _medium(mi, density, voxel_size, origin, settings.extinction)
-    return _photographed(mi, scene, settings)
+    light = _photographed(mi, scene, settings)
+    if not settings.denoised:
+        return light
+    box = active_box(density) if density.any() else (slice(0, 2),) * 3
+    sigma = density[box] * np.float32(settings.extinction * voxel_size)
+    corner = np.array(origin) + voxel_size * np.array([side.start for side in box[::-1]])
+    stage = _empty_stage(dataclasses.replace(settings, spp=STAGE_SPP, seed=1))
+    return denoise.denoised(light, denoise.Grid(sigma, voxel_size, corner), settings.camera, stage)
+
+
+@functools.lru_cache(maxsize=2)
+def _empty_stage(settings: VolumeSettings) -> denoise.Stage:
+    """The studio without smoke, kept for all frames of an animation."""
+    mi = backend.mitsuba("scalar_rgb")
+    scene = _studio(mi, settings.bowl)
+    light = _photographed(mi, scene, settings)
+    loaded = mi.load_dict({"type": "scene"} | scene)
+    position, rays = denoise.view_rays(settings.camera, settings.width, settings.height)
+    unit = rays.reshape(-1, 3) / np.linalg.norm(rays.reshape(-1, 3), axis=1, keepdims=True)
+    start = mi.Point3f(list(position))
+    met = [loaded.ray_intersect(mi.Ray3f(start, mi.Vector3f(list(ray)))) for ray in unit]
+    distance = np.minimum([m.t for m in met], FARTHEST).reshape(light.shape[:2])
+    bowl = [list(m.sh_frame.n) if m.is_valid() and m.shape.id() == "bowl" else [0.0] * 3 for m in met]
+    return denoise.quiet_stage(light, distance, np.array(bowl).reshape(light.shape))
 
 
 def _photographed(mi: Any, scene: dict[str, Any], settings: VolumeSettings) -> np.ndarray:
@@ -306,12 +334,12 @@ def _medium(mi: Any, density: np.ndarray, voxel_size: float, origin: tuple[float
     }
 
 
-def _mesh(mi: Any, mesh: studio.Mesh, colour: studio.Point) -> Any:
+def _mesh(mi: Any, name: str, mesh: studio.Mesh, colour: studio.Point) -> Any:
     """A diffuse Mitsuba shape of a studio mesh, both sides alike."""
     paint = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(colour)}}
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": paint})
-    shape = mi.Mesh("mesh", len(mesh.vertices), len(mesh.faces), props=properties)
+    shape = mi.Mesh(name, len(mesh.vertices), len(mesh.faces), props=properties)
     parameters = mi.traverse(shape)
     parameters["vertex_positions"] = np.ascontiguousarray(mesh.vertices, np.float32).ravel()
     parameters["faces"] = np.ascontiguousarray(mesh.faces, np.uint32).ravel()
@@ -319,22 +347,15 @@ def _mesh(mi: Any, mesh: studio.Mesh, colour: studio.Point) -> Any:
     return shape
 
 
-def _stage(mi: Any, settings: VolumeSettings) -> dict[str, Any]:
-    """Backdrop and bowl."""
-    stage = {"backdrop": _mesh(mi, studio.backdrop(), studio.BACKDROP_COLOUR)}
-    if settings.bowl:
-        stage["bowl"] = _mesh(mi, studio.bowl(*settings.bowl), studio.BOWL_COLOUR)
-    return stage
-
-
-def _lights(mi: Any) -> dict[str, Any]:
-    """Key, rim and sky; `sampling_weight` sends most shadow rays to the two that matter."""
-    lights: dict[str, Any] = {
+def _studio(mi: Any, bowl: tuple[float, float] | None) -> dict[str, Any]:
+    """Backdrop and bowl, key, rim and sky; `sampling_weight` sends most shadow rays to key and rim."""
+    scene: dict[str, Any] = {
+        "backdrop": _mesh(mi, "backdrop", studio.backdrop(), studio.BACKDROP_COLOUR),
         "sky": {"type": "constant", "radiance": {"type": "rgb", "value": list(studio.SKY)},
                 "sampling_weight": studio.SKY_SHARE},
     }
     for name, box in (("key", studio.KEY), ("rim", studio.RIM)):
-        lights[name] = {
+        scene[name] = {
             "type": "rectangle",
             "to_world": mi.ScalarTransform4f().look_at(
                 origin=list(box.position), target=list(box.target), up=[0, 1, 0]
@@ -342,4 +363,6 @@ def _lights(mi: Any) -> dict[str, Any]:
             "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(box.radiance)},
                         "sampling_weight": box.share},
         }
-    return lights
+    if bowl:
+        scene["bowl"] = _mesh(mi, "bowl", studio.bowl(*bowl), studio.BOWL_COLOUR)
+    return scene

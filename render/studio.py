@@ -45,12 +45,12 @@ class Softbox:
 
 
 CAMERA = Camera()
-KEY = Softbox((-2.6, 2.9, 2.3), (0.0, 0.4, 0.0), (1.5, 1.5), (13.0, 12.0, 10.8), 1.0)
-RIM = Softbox((2.5, 2.0, -2.2), (0.0, 0.5, 0.0), (1.0, 1.8), (7.0, 9.2, 13.0), 1.0)
-SKY: Point = (0.055, 0.068, 0.09)  # radiance of the dim light from everywhere
+KEY = Softbox((-3.0, 2.6, 1.6), (0.0, 0.4, 0.0), (1.5, 1.5), (46.0, 41.0, 35.0), 1.0)  # warm, from the left
+RIM = Softbox((2.5, 2.0, -2.2), (0.0, 0.5, 0.0), (1.0, 1.8), (14.0, 18.0, 24.0), 1.0)  # cool, from behind
+SKY: Point = (0.055, 0.066, 0.085)  # radiance of the dim light from everywhere
 SKY_SHARE = 0.15
-BACKDROP_COLOUR: Point = (0.15, 0.17, 0.205)
-BOWL_COLOUR: Point = (0.20, 0.19, 0.18)
+BACKDROP_COLOUR: Point = (0.085, 0.092, 0.105)
+BOWL_COLOUR: Point = (0.085, 0.075, 0.070)
 
 
 def extruded(profile: np.ndarray, half_width: float) -> Mesh:
