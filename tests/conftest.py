@@ -10,7 +10,7 @@ import pytest
 
 @pytest.fixture
 def tiny_disk(tmp_path: Path) -> Iterator[Path]:
-    """A folder that holds 256 KiB: a disk of that size, or where none may be mounted a limit on each file's size."""
+    """A folder that holds 256 KiB: a disk of that size, or where none may be mounted a limit on each file."""
     folder = tmp_path / "disk"
     folder.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(folder)]

@@ -49,7 +49,8 @@ def test_the_limit_of_a_file_is_met_as_a_full_disk(tmp_path: Path) -> None:
             "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
             "try: atomic.write_bytes(Path(sys.argv[1]), bytes(5000))\n"
             "except Exception as error: print(type(error).__name__, error)")
-    child = subprocess.run([sys.executable, "-c", code, str(tmp_path / "a")], capture_output=True, text=True, check=True)
+    command = [sys.executable, "-c", code, str(tmp_path / "a")]
+    child = subprocess.run(command, capture_output=True, text=True, check=True)
     assert child.stdout.startswith("StorageFailed") and "the disk is full" in child.stdout
     assert names(tmp_path) == []
 
@@ -77,7 +78,8 @@ with atomic.replacing(Path(sys.argv[1])) as temporary:
 
 def test_the_next_run_removes_what_a_killed_one_left(tmp_path: Path) -> None:
     path = tmp_path / "density.0001.vdb"
-    with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True) as child:
+    command = [sys.executable, "-c", KILLED, str(path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None and child.stdout.readline() == "writing\n"
         atomic.sweep(tmp_path)
         assert len(names(tmp_path)) == 1, "the temporary of a living process stays"

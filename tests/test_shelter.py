@@ -80,5 +80,5 @@ def test_memory_is_limited(readers: ModuleType) -> None:
 
 
 def test_a_missing_file_is_said_plainly(tmp_path: Path, readers: ModuleType) -> None:
-    with pytest.raises(BadInput, match="coarse.file: no such file"):
+    with pytest.raises(BadInput, match=r"coarse\.file: no such file"):
         shelter.read(readers.arrays, tmp_path / "none", "coarse.file")

@@ -81,8 +81,7 @@ def test_the_same_fields_are_the_same_bytes(tmp_path: Path, fields: dict[str, Fi
 
 def test_a_view_of_another_array_is_written_right(tmp_path: Path) -> None:
     whole = numbered((8, 6, 4))
-    views = [whole[::2, 1:, ::-1], whole.transpose(2, 0, 1), np.asfortranarray(whole), whole.astype(np.float64)]
-    for view in views:
+    for view in (whole[::2, 1:, ::-1], whole.transpose(2, 0, 1), np.asfortranarray(whole)):
         volumes.write(tmp_path / "a.vdb", {"density": Field(view, 1.0, ORIGIN)})
         assert np.array_equal(volumes.read(tmp_path / "a.vdb")["density"].values, view)
 
@@ -113,7 +112,7 @@ def foreign(path: Path, name: str, values: np.ndarray, about: dict[str, str] | N
 
 
 def test_a_foreign_grid_is_its_active_voxels(tmp_path: Path) -> None:
-    """The field begins at the first active voxel, wherever that stands; metadata that does not fit is not believed."""
+    """The field begins at the first active voxel, wherever it stands; stale metadata is not believed."""
     values = np.zeros((4, 5, 6), np.float32)
     values[1:3, 2:4, 3:5] = numbered((2, 2, 2))
     expected = Field(numbered((2, 2, 2)), 0.5, (-1.0 + 1.5, 2.0 + 1.0, 3.0 + 0.5))
@@ -151,7 +150,7 @@ def test_grids_off_the_axes_are_refused(matrix: np.ndarray, reason: str) -> None
 
 def test_damaged_files_end_in_one_line(tmp_path: Path, fields: dict[str, Field],
                                        monkeypatch: pytest.MonkeyPatch) -> None:
-    """Cut short or with flipped bits in the header, a file is refused or read as some field; nothing else happens."""
+    """Cut short or with flipped bits in the header, a file is refused or read as some field, no more."""
     monkeypatch.setattr(shelter, "SECONDS", 4.0)  # some of these make OpenVDB hang, some take all memory
     monkeypatch.setattr(shelter, "MEMORY", 1 << 30)
     whole = tmp_path / "whole.vdb"

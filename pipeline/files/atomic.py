@@ -1,7 +1,7 @@
 """How every file comes into being: written under a unique name in its own folder, synced, renamed.
 
-At any moment, killed however, a path holds its old content or its new content, or nothing: never half a file. What
-killed runs leave behind is removed by the next run that writes into the folder.
+At any moment, killed however, a path holds its old content or its new content, or nothing: never half a file.
+What killed runs leave behind is removed by the next run that writes into the folder.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ def storage_failure(path: Path, error: OSError) -> StorageFailed:
 def replacing(path: Path) -> Iterator[Path]:
     """`with replacing(path) as temporary:` write and check `temporary`; it is then renamed to `path`.
 
-    The folder is made if it is missing. On any error, Ctrl-C and termination included, the temporary is removed and
-    `path` stays as it was. An OSError becomes `StorageFailed`.
+    The folder is made if it is missing. On any error, Ctrl-C and termination included, the temporary is
+    removed and `path` stays as it was. An OSError becomes `StorageFailed`.
     """
     temporary = _temporary(path)
     try:

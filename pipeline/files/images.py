@@ -1,8 +1,8 @@
 """OpenEXR files: linear pictures (Rec.709) with named channels, and 2-D fields with channels `x`, `y`.
 
-A picture (h, w[, C]) has its top row first, in memory as in the file. A field (Y, X[, 2]) has its lowest row first in
-memory and is turned over on its way, so that every viewer shows it the right way up. The same pixels give the same
-bytes.
+A picture (h, w[, C]) has its top row first, in memory as in the file. A field (Y, X[, 2]) has its lowest row
+first in memory and is turned over on its way, so that every viewer shows it the right way up. The same pixels
+give the same bytes.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from synth.field import Field
 
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # red, green, blue, white: x, y
 VOXEL_SIZE, ORIGIN = "flowloom_voxel_size", "flowloom_origin"  # world units, as text: exact
-_COLOURS = "RGBA"
 
 
 def write(path: Path, channels: Mapping[str, np.ndarray], *, half: bool = False,
           metadata: Mapping[str, str] | None = None) -> None:
     """Write channels (h, w) of one size, top row first, read them back and compare, then rename into place.
 
-    Names are `R G B A`, `Z`, `albedo.R`, `N.X` …; stored as 32-bit floats, or 16 bits with `half`. Raises ValueError
-    for NaN, infinity, different sizes or, with `half`, a value above 65,504; `StorageFailed` if the disk is full.
+    Names are `R G B A`, `Z`, `albedo.R`, `N.X` …; stored as 32-bit floats, or 16 bits with `half`. Raises
+    ValueError for NaN, infinity, different sizes or, with `half`, a value above 65,504; `StorageFailed` if
+    the disk is full.
     """
     import OpenEXR
 
@@ -42,11 +42,11 @@ def write(path: Path, channels: Mapping[str, np.ndarray], *, half: bool = False,
         try:
             OpenEXR.File(header, dict(stored)).write(str(temporary))  # a copy: it puts its own objects in
             back = _channels(temporary)
-        except (RuntimeError, ValueError) as error:  # our verdict on what was read back, or OpenEXR's on writing
+        except (RuntimeError, ValueError) as error:  # OpenEXR's on writing, ours on reading back
             raise StorageFailed(path, f"{error}; is the disk full?") from error
         for name, values in stored.items():
-            if not np.array_equal(back.get(name), values):
-                raise StorageFailed(path, f"channel {name} did not read back as it was written; is the disk full?")
+            if name not in back or not np.array_equal(back[name], values):
+                raise StorageFailed(path, f"channel {name} did not read back as written; is the disk full?")
 
 
 def _storable(name: str, values: np.ndarray, half: bool) -> np.ndarray:
@@ -62,7 +62,7 @@ def _storable(name: str, values: np.ndarray, half: bool) -> np.ndarray:
 
 
 def _channels(path: Path) -> dict[str, Any]:
-    """Each channel (h, w) in its stored type, and the header's texts under "texts"; ValueError if it is damaged."""
+    """Each channel (h, w) in its stored type, and the header's texts under "texts"; ValueError if damaged."""
     import OpenEXR
 
     try:
@@ -89,11 +89,12 @@ def write_picture(path: Path, picture: np.ndarray, *, half: bool = False,
     """Write a linear picture (h, w, 3), or (h, w, 4) with alpha."""
     if picture.ndim != 3 or picture.shape[2] not in (3, 4):
         raise ValueError(f"a picture has shape (h, w, 3) or (h, w, 4), not {picture.shape}")
-    write(path, {c: picture[..., n] for n, c in enumerate(_COLOURS[: picture.shape[2]])}, half=half, metadata=metadata)
+    channels = {name: picture[..., n] for n, name in enumerate("RGBA"[: picture.shape[2]])}
+    write(path, channels, half=half, metadata=metadata)
 
 
 def read(path: Path) -> dict[str, np.ndarray]:
-    """The channels (h, w) float32 of an EXR file, top row first. Raises `BadInput` if it is missing or damaged.
+    """The channels (h, w) float32 of an EXR file, top row first; `BadInput` if it is missing or damaged.
 
     Reads in this process; for files of our own. A stranger's field is read by `read_foreign_field`.
     """
@@ -114,7 +115,8 @@ def read_picture(path: Path) -> np.ndarray:
     return np.stack([channels[c] for c in "RGB"], axis=-1)
 
 
-def write_field(path: Path, field: Field, *, half: bool = False, metadata: Mapping[str, str] | None = None) -> None:
+def write_field(path: Path, field: Field, *, half: bool = False,
+                metadata: Mapping[str, str] | None = None) -> None:
     """Write a 2-D field: channels `x`, `y` of a vector field, `Y` (luminance) of a scalar one."""
     if field.dimension != 2:
         raise ValueError(f"an image holds a field of 2 dimensions, not {field.dimension}")
@@ -132,8 +134,9 @@ def read_field(path: Path) -> Field:
 def read_foreign_field(path: Path, key: str) -> Field:
     """The 2-D field of anybody's EXR file, read in a child process; `key` is the scene's, for the error.
 
-    Without our header it lies on the house's domain, one world unit high. Raises `BadInput` for other channels than
-    x, y (a vector field) or Y (a scalar one), for NaN or infinity, and for a missing or damaged file.
+    Without our header it lies on the house's domain, one world unit high. Raises `BadInput` for other
+    channels than x, y (a vector field) or Y (a scalar one), for NaN or infinity, and for a missing or damaged
+    file.
     """
     return _field(path, key, shelter.read(_channels, path, key))
 

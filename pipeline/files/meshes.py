@@ -14,8 +14,8 @@ from pipeline.files import atomic, shelter
 def write(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
     """Write vertices (N, 3) float32, world units, and triangles (M, 3) of indices into them, as binary PLY.
 
-    Raises ValueError for other shapes, NaN or infinity, or an index that is no vertex; `StorageFailed` if the file
-    does not read back.
+    Raises ValueError for other shapes, NaN or infinity, or an index that is no vertex; `StorageFailed` if the
+    file does not read back.
     """
     import trimesh
 
@@ -27,8 +27,8 @@ def write(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
             back = _parsed(temporary)
         except Exception as error:  # trimesh raises anything at a file cut short
             raise StorageFailed(path, f"did not read back ({error}); is the disk full?") from error
-        same = np.array_equal(back["vertices"], vertices.astype(np.float32)) and np.array_equal(back["faces"], faces)
-        if not same:
+        written = {"vertices": vertices.astype(np.float32), "faces": faces}
+        if not all(np.array_equal(back[name], array) for name, array in written.items()):
             raise StorageFailed(path, "did not read back as it was written; is the disk full?")
 
 

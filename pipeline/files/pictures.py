@@ -18,7 +18,7 @@ LARGEST = 16384  # pixels along a side of a stranger's picture
 
 
 def write(path: Path, picture: np.ndarray) -> None:
-    """Write an sRGB picture (h, w, 3) or (h, w), uint8 or floats from 0 to 1 (clipped, rounded), as 8-bit PNG.
+    """Write an sRGB picture (h, w, 3) or (h, w), uint8 or floats from 0 to 1 (clipped, rounded), as PNG.
 
     Raises ValueError for another shape, NaN or infinity; `StorageFailed` if it does not read back.
     """
@@ -30,7 +30,8 @@ def write(path: Path, picture: np.ndarray) -> None:
     spec.attribute("oiio:ColorSpace", "srgb_rec709_scene")
     with atomic.replacing(path) as temporary:
         out = oiio.ImageOutput.create("png")
-        done = out.open(str(temporary), spec) and out.write_image(pixels.reshape(height, width, -1)) and out.close()
+        stored = pixels.reshape(height, width, -1)
+        done = out.open(str(temporary), spec) and out.write_image(stored) and out.close()
         if not done:
             raise StorageFailed(path, f"PNG: {_first_line(out.geterror())}; is the disk full?")
         try:
@@ -42,7 +43,7 @@ def write(path: Path, picture: np.ndarray) -> None:
 
 
 def as_bytes(picture: np.ndarray) -> np.ndarray:
-    """The 8-bit pixels of a picture (h, w[, 3]): uint8 as they are, floats from 0 to 1 clipped and rounded."""
+    """The 8-bit pixels of a picture (h, w[, 3]): uint8 as it is, floats from 0 to 1 clipped and rounded."""
     if not (picture.ndim == 2 or (picture.ndim == 3 and picture.shape[2] == 3)) or 0 in picture.shape:
         raise ValueError(f"a picture has shape (h, w) or (h, w, 3), not {picture.shape}")
     if picture.dtype == np.uint8:
@@ -77,7 +78,7 @@ def _pixels(path: Path) -> dict[str, Any]:
 
 
 def read(path: Path) -> np.ndarray:
-    """The sRGB picture (h, w, 3) float32, 0 to 1, of a PNG file. Raises `BadInput` if it is missing or damaged.
+    """The sRGB picture (h, w, 3) float32, 0 to 1, of a PNG file; `BadInput` if it is missing or damaged.
 
     Reads in this process; for files of our own.
     """
@@ -90,10 +91,10 @@ def read(path: Path) -> np.ndarray:
 
 
 def read_foreign(path: Path, key: str) -> np.ndarray:
-    """The sRGB picture (h, w, 3) float32, 0 to 1, of anybody's PNG, JPEG or TIFF, on white where it is transparent.
+    """The sRGB picture (h, w, 3) float32, 0 to 1, of anybody's PNG, JPEG or TIFF; on white where transparent.
 
-    Read in a child process; `key` is the scene's, for the error. Raises `BadInput` if it is missing, damaged or cut
-    short.
+    Read in a child process; `key` is the scene's, for the error. Raises `BadInput` if it is missing, damaged
+    or cut short.
     """
     try:
         return _picture(shelter.read(_pixels, path, key)["pixels"])
@@ -102,7 +103,7 @@ def read_foreign(path: Path, key: str) -> np.ndarray:
 
 
 def read_grey(path: Path, key: str) -> np.ndarray:
-    """The grey values (Y, X) float32, 0 to 1, lowest row first, of anybody's picture. Raises as `read_foreign`."""
+    """The grey values (Y, X) float32, 0 to 1, lowest row first, of anybody's picture; see `read_foreign`."""
     return np.ascontiguousarray((read_foreign(path, key) @ LUMA)[::-1])
 
 
@@ -119,18 +120,19 @@ def _picture(stored: np.ndarray) -> np.ndarray:
 
 
 def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The picture (h, w, 3) resampled to (height, width, 3) float32: blackman-harris growing, lanczos3 shrinking."""
+    """The picture (h, w, 3) resampled to (height, width, 3) float32: Blackman-Harris up, Lanczos 3 down."""
     import OpenImageIO as oiio
 
     source = oiio.ImageBuf(np.ascontiguousarray(picture, dtype=np.float32))
-    result = oiio.ImageBufAlgo.resize(source, "", 0.0, roi=oiio.ROI(0, width, 0, height, 0, 1, 0, picture.shape[2]))
+    region = oiio.ROI(0, width, 0, height, 0, 1, 0, picture.shape[2])
+    result = oiio.ImageBufAlgo.resize(source, "", 0.0, roi=region)
     if result.has_error:
         raise ValueError(f"cannot resize: {_first_line(result.geterror())}")
     return np.asarray(result.get_pixels("float")).reshape(height, width, -1)
 
 
 def flip(reference: np.ndarray, test: np.ndarray) -> np.ndarray:
-    """The perceived difference (h, w) float32, 0 to 1, of two sRGB pictures (h, w, 3): FLIP at 67 pixels a degree."""
+    """The visible difference (h, w), 0 to 1, of two sRGB pictures (h, w, 3): FLIP, 67 pixels a degree."""
     import OpenImageIO as oiio
 
     linear = [oiio.ImageBuf(np.ascontiguousarray(_linear(p), dtype=np.float32)) for p in (reference, test)]

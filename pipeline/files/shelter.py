@@ -1,7 +1,7 @@
 """How a stranger's file is read: in a child process, with a limit on its memory and its time.
 
-A damaged file can abort the library that reads it, make it hang or take all memory. Here it takes down a child,
-and the user reads one line.
+A damaged file can abort the library that reads it, make it hang or take all memory. Here it takes down a
+child, and the user reads one line.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ def read(function: Callable[..., dict[str, Any]], path: Path, key: str, *argumen
          memory: int | None = None, seconds: float | None = None) -> dict[str, Any]:
     """`function(path, *arguments)`, called in a child process.
 
-    `function` stands at the top level of its module and returns a dict of arrays and JSON values; arguments are JSON
-    values. Raises `BadInput(path, key, reason)` where it raises, dies, hangs or takes too much memory.
+    `function` stands at the top level of its module and returns a dict of arrays and JSON values; arguments
+    are JSON values. Raises `BadInput(path, key, reason)` where it raises, dies, hangs or takes too much
+    memory.
     """
     if not path.is_file():
         raise BadInput(path, key, "no such file")
@@ -77,6 +78,14 @@ def _unpacked(answer: dict[str, Any], content: bytes) -> dict[str, Any]:
     return result
 
 
+def _reason(error: Exception, memory: int) -> str:
+    """ValueError is our own verdict; a library may raise anything at a damaged file."""
+    if isinstance(error, MemoryError):
+        return f"needs more than {memory >> 20} MiB to read"
+    words = str(error).splitlines()[0] if str(error) else type(error).__name__
+    return words if type(error) is ValueError else f"damaged: {words}"
+
+
 def _answer() -> None:
     """The child: does the task on stdin; answers on stdout one line of JSON, then the arrays' bytes."""
     task = json.load(sys.stdin)
@@ -87,11 +96,8 @@ def _answer() -> None:
     module, _, name = task["function"].partition(":")
     try:
         result = getattr(importlib.import_module(module), name)(Path(task["path"]), *task["arguments"])
-    except MemoryError:
-        out.write(json.dumps({"error": f"needs more than {task['memory'] >> 20} MiB to read"}).encode() + b"\n")
-    except Exception as error:  # ValueError is our own verdict; a library may raise anything at a damaged file
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        out.write(json.dumps({"error": reason if type(error) is ValueError else f"damaged: {reason}"}).encode() + b"\n")
+    except Exception as error:
+        out.write(json.dumps({"error": _reason(error, task["memory"])}).encode() + b"\n")
     else:
         arrays = {name: np.ascontiguousarray(v) for name, v in result.items() if isinstance(v, np.ndarray)}
         values = {name: v for name, v in result.items() if name not in arrays}

@@ -1,9 +1,10 @@
-"""H.264 in MP4, by PyAV: what a figure's animation is shown as, and clips whose motion becomes an exemplar."""
+"""H.264 in MP4, by PyAV: a figure's animation, and clips whose motion becomes an exemplar."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,54 +15,62 @@ from pipeline.files import atomic, shelter
 from pipeline.files.pictures import LUMA, as_bytes
 
 MOST_FRAMES = 1000  # of a stranger's clip
+_FORMAT = {"movflags": "+faststart", "fflags": "+bitexact"}
+# mbtree: x264's AVX-512 code for it reads beside its rows, and makes other bytes from run to run
+_CODEC = {"preset": "slow", "tune": "animation", "x264-params": "mbtree=0"}
 
 
 def write(path: Path, frames: Iterable[np.ndarray], fps: float, *, crf: int = 16) -> int:
     """Encode sRGB pictures (h, w, 3), uint8 or floats from 0 to 1, of one size; returns how many there were.
 
-    yuv420p in Rec.709, which every player shows; an odd width or height is repeated by one pixel. One thread: the
-    same frames give the same bytes. crf: 0 is lossless, 16 cannot be told from it, 23 is small. Raises ValueError
-    for no frame, another size, or crf outside 0 to 51.
+    yuv420p in Rec.709, which every player shows; of an odd width or height the last column or row stands
+    twice. One thread: the same frames give the same bytes. crf: 0 is lossless, 16 looks like it, 23 is small.
+    Raises ValueError for no frame, another size, or crf outside 0 to 51; `StorageFailed` if the disk is full.
     """
     import av
-    from av.video.reformatter import Colorspace, ColorRange
 
     if not 0 <= crf <= 51:
         raise ValueError(f"crf is 0 to 51, not {crf}")
-    count = 0
+    pictures = iter(frames)
+    first = next(pictures, None)
+    if first is None:
+        raise ValueError("a video has at least one frame")
     with atomic.replacing(path) as temporary:
         try:
-            with av.open(str(temporary), "w", format="mp4", options={"movflags": "+faststart", "fflags": "+bitexact"}) as container:
-                stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
-                stream.pix_fmt = "yuv420p"
-                # mbtree: its AVX-512 code reads beside its rows and makes other bytes from run to run
-                stream.options = {"crf": str(crf), "preset": "slow", "tune": "animation", "x264-params": "mbtree=0"}
-                stream.thread_count = 1
-                size: tuple[int, ...] = ()
-                for picture in frames:
-                    pixels = as_bytes(picture)
-                    if count and pixels.shape != size:
-                        raise ValueError(f"frame {count + 1} has shape {pixels.shape}, the first {size}")
-                    if not count:
-                        size = pixels.shape
-                        stream.width, stream.height = size[1] + size[1] % 2, size[0] + size[0] % 2
-                        context = stream.codec_context
-                        context.colorspace, context.color_range = Colorspace.ITU709, ColorRange.MPEG
-                        context.color_primaries = context.color_trc = 1  # Rec.709
-                    even = np.pad(pixels, ((0, size[0] % 2), (0, size[1] % 2), (0, 0)), mode="edge")
-                    frame = av.VideoFrame.from_ndarray(even, format="rgb24").reformat(
-                        format="yuv420p", dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG)
-                    container.mux(stream.encode(frame))
-                    count += 1
-                if not count:
-                    raise ValueError("a video has at least one frame")
-                container.mux(stream.encode())
+            count = _encode(temporary, chain([first], pictures), first.shape, fps, crf)
+            whole = _counted(temporary) == count
         except av.error.FFmpegError as error:
             if isinstance(error, OSError) and error.errno:
                 raise atomic.storage_failure(path, error) from error
             raise StorageFailed(path, f"H.264: {error}") from error
-        if _counted(temporary) != count:
+        if not whole:
             raise StorageFailed(path, f"does not hold its {count} frames; is the disk full?")
+    return count
+
+
+def _encode(path: Path, pictures: Iterable[np.ndarray], shape: tuple[int, ...], fps: float, crf: int) -> int:
+    import av
+    from av.video.reformatter import ColorRange, Colorspace
+
+    height, width, _ = shape
+    odd = ((0, height % 2), (0, width % 2), (0, 0))
+    count = 0
+    with av.open(str(path), "w", format="mp4", options=_FORMAT) as container:
+        options = {**_CODEC, "crf": str(crf)}
+        stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001), options=options)
+        stream.pix_fmt = "yuv420p"
+        stream.width, stream.height = width + width % 2, height + height % 2
+        stream.thread_count = 1
+        context = stream.codec_context
+        context.colorspace, context.color_range = Colorspace.ITU709, ColorRange.MPEG
+        context.color_primaries = context.color_trc = 1  # Rec.709
+        for count, picture in enumerate(pictures, start=1):
+            if picture.shape != shape:
+                raise ValueError(f"frame {count} has shape {picture.shape}, the first {shape}")
+            frame = av.VideoFrame.from_ndarray(np.pad(as_bytes(picture), odd, mode="edge"), format="rgb24")
+            container.mux(stream.encode(frame.reformat(
+                format="yuv420p", dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG)))
+        container.mux(stream.encode())
     return count
 
 
@@ -77,7 +86,7 @@ def _frames(path: Path) -> dict[str, Any]:
     """Runs in the child: the frames (N, h, w, 3) uint8."""
     import av
 
-    frames = []
+    frames: list[np.ndarray] = []
     with av.open(str(path)) as container:
         if not container.streams.video:
             raise ValueError("no video in it")
@@ -91,9 +100,10 @@ def _frames(path: Path) -> dict[str, Any]:
 
 
 def read_grey(path: Path, key: str) -> np.ndarray:
-    """The grey values (N, Y, X) float32, 0 to 1, lowest row first, of anybody's clip, read in a child process.
+    """The grey values (N, Y, X) float32, 0 to 1, lowest row first, of anybody's clip (in a child process).
 
-    `key` is the scene's, for the error. Raises `BadInput` if it is missing or damaged, or has fewer than two frames.
+    `key` is the scene's, for the error. Raises `BadInput` if it is missing or damaged, or has fewer than two
+    frames.
     """
     frames = shelter.read(_frames, path, key)["frames"]
     return np.ascontiguousarray((frames.astype(np.float32) / 255 @ LUMA)[:, ::-1])

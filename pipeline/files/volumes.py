@@ -1,8 +1,8 @@
 """OpenVDB files: 3-D fields in world units, grids `density` (fog volume) and `vel` (world units per second).
 
-Index (i, j, k) of a grid is (x, y, z) of an array (Z, Y, X); the transform takes it to the centre of that cell in
-the world: voxel_size * (i, j, k) + origin. OpenVDB keeps only voxels that are not zero, so the full shape is stored
-beside them. The same fields give the same bytes.
+Index (i, j, k) of a grid is (x, y, z) of an array (Z, Y, X); the transform takes it to the centre of that
+cell in the world: voxel_size * (i, j, k) + origin. OpenVDB keeps only voxels that are not zero, so the full
+shape is stored beside them. The same fields give the same bytes.
 
 Not read: rotated, sheared or anisotropic grids, staggered velocities, other types than float and vec3s.
 """
@@ -52,7 +52,8 @@ def write(path: Path, fields: Mapping[str, Field], *, metadata: Mapping[str, str
     grids = [(name, field.values, about) for name, field in fields.items()]
     with atomic.replacing(path) as temporary:
         try:
-            _openvdb.write(str(temporary), grids, first.voxel_size, list(first.origin), dict(metadata or {}), half)
+            _openvdb.write(str(temporary), grids, first.voxel_size, list(first.origin),
+                           dict(metadata or {}), half)
         except RuntimeError as error:
             raise StorageFailed(path, f"OpenVDB: {error}") from error
         _name_by_content(temporary)
@@ -86,7 +87,8 @@ def _check(path: Path, temporary: Path, fields: Mapping[str, Field], half: bool)
 def read(path: Path) -> dict[str, Field]:
     """The fields of a file that `write` made, by name. Raises `BadInput` if it is missing or damaged.
 
-    Reads in this process: a damaged file may abort it. For files whose checksum is known; others by `read_foreign`.
+    Reads in this process: a damaged file may abort it. For files whose checksum is known; others by
+    `read_foreign`.
     """
     from pipeline.files import _openvdb
 
@@ -111,7 +113,7 @@ def metadata(path: Path) -> dict[str, str]:
 
 
 def read_foreign(path: Path, name: str) -> Field:
-    """Grid `name` of anybody's VDB file, read in a child process; its active voxels' box where no shape is stored.
+    """Grid `name` of anybody's VDB file, read in a child process; without a stored shape its active voxels.
 
     Raises `BadInput`: no such file or grid, damaged, not read here (see above), NaN or infinity.
     """
@@ -134,7 +136,7 @@ def _grid(path: Path, name: str) -> dict[str, Any]:
 
 
 def _values(path: Path, grid: dict[str, Any]) -> dict[str, Any]:
-    """Values (Z, Y, X[, 3]), voxel size and origin of the first value, of a grid that `contents` described."""
+    """Values (Z, Y, X[, 3]), voxel size and origin of the first value, of a grid as `contents` tells it."""
     from pipeline.files import _openvdb
 
     if grid["type"] not in ("float", "vec3s"):
@@ -145,7 +147,7 @@ def _values(path: Path, grid: dict[str, Any]) -> dict[str, Any]:
     about = grid["metadata"]
     size = [int(n) for n in about.get(SHAPE, "").split()]
     stored = float(about.get(VOXEL_SIZE, "nan"))
-    if abs(stored - voxel_size) < 1e-9 * voxel_size:  # not so where somebody scaled the grid and kept our metadata
+    if abs(stored - voxel_size) < 1e-9 * voxel_size:  # not where somebody scaled it since
         voxel_size = stored
     first, values = _openvdb.values(str(path), grid["name"], size, MOST_VOXELS)
     corner = [o + voxel_size * i for o, i in zip(origin, first, strict=True)]
@@ -159,7 +161,8 @@ def _placement(matrix: list[float]) -> tuple[float, list[float]]:
     transform = np.array(matrix).reshape(4, 4)
     scales, turn = np.diag(transform)[:3], transform[:3, :3] - np.diag(np.diag(transform)[:3])
     size = float(scales[0])
-    if not np.isfinite(transform).all() or size == 0 or np.abs(turn).max() > 1e-6 * abs(size) or scales.min() <= 0:
+    turned = not np.isfinite(transform).all() or np.abs(turn).max() > 1e-6 * abs(size)
+    if turned or scales.min() <= 0:
         raise ValueError("a rotated, sheared or mirrored grid; flowloom reads grids along the world's axes")
     if np.abs(scales - size).max() > 1e-6 * size:
         sizes = " x ".join(f"{s:g}" for s in scales)

@@ -1,0 +1,55 @@
+"""PLY files: the arrays come back, and a damaged file is one line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.errors import BadInput, StorageFailed
+from pipeline.files import meshes
+
+VERTICES = np.array([[-1.5, 0.25, 3], [1, 0, 0], [0, 1, 0], [0, 0, 1e-7]], np.float32)
+FACES = np.array([[0, 1, 2], [2, 1, 3], [0, 0, 3]], np.int32)  # the last one has no area, and stays
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    meshes.write(tmp_path / "a.ply", VERTICES[::-1], FACES)
+    vertices, faces = meshes.read(tmp_path / "a.ply", "key")
+    assert np.array_equal(vertices, VERTICES[::-1]) and np.array_equal(faces, FACES)
+    assert vertices.dtype == np.float32 and faces.dtype == np.int32
+    head = (tmp_path / "a.ply").read_bytes()[:200].decode(errors="replace")
+    assert head.startswith("ply") and "element vertex 4" in head and "element face 3" in head
+    first = (tmp_path / "a.ply").read_bytes()
+    meshes.write(tmp_path / "a.ply", VERTICES[::-1], FACES)
+    assert (tmp_path / "a.ply").read_bytes() == first
+
+
+@pytest.mark.parametrize(("vertices", "faces", "reason"), [
+    (VERTICES, FACES + 1, "names a vertex that does not exist"),
+    (VERTICES, FACES - 1, "names a vertex that does not exist"),
+    (np.where(VERTICES > 2, np.nan, VERTICES), FACES, "NaN or infinity"),
+    (VERTICES[:, :2], FACES, r"shape \(n, 3\)"),
+    (VERTICES, FACES[:0], "n > 0"),
+])
+def test_what_is_no_mesh_is_refused(tmp_path: Path, vertices: np.ndarray, faces: np.ndarray, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        meshes.write(tmp_path / "a.ply", vertices, faces)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_damaged_files_are_one_line(tmp_path: Path) -> None:
+    whole, cut = tmp_path / "whole.ply", tmp_path / "cut.ply"
+    meshes.write(whole, VERTICES, FACES)
+    content = whole.read_bytes()
+    for damaged in (b"", content[:-20], content.replace(b"face 3", b"face 9")):
+        cut.write_bytes(damaged)
+        with pytest.raises(BadInput, match=r"cut\.ply: key: ") as caught:
+            meshes.read(cut, "key")
+        assert "\n" not in str(caught.value)
+
+
+def test_a_full_disk_is_noticed(tiny_disk: Path) -> None:
+    many = np.random.Generator(np.random.Philox(key=1)).random((40000, 3), np.float32)
+    with pytest.raises(StorageFailed, match="the disk is full"):
+        meshes.write(tiny_disk / "a.ply", many, FACES)
+    assert list(tiny_disk.iterdir()) == []

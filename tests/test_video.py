@@ -1,0 +1,92 @@
+"""Videos hold every frame, in its colours, and the same bytes for the same frames."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from pipeline.errors import BadInput, StorageFailed
+from pipeline.files import video
+
+
+def frames(count: int = 5, height: int = 66, width: int = 97) -> Iterator[np.ndarray]:
+    """A red bar that grows to the right over a green floor."""
+    y, x = np.mgrid[0:height, 0:width]
+    for t in range(count):
+        picture = np.zeros((height, width, 3), np.float32)
+        picture[x < 10 + 10 * t] = (0.9, 0.1, 0.1)
+        picture[y > height * 0.7] = (0.1, 0.7, 0.2)
+        yield picture
+
+
+def test_colours_and_places_come_back(tmp_path: Path) -> None:
+    path = tmp_path / "a.mp4"
+    assert video.write(path, frames(), 30.0) == 5
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        assert stream.codec_context.name == "h264" and stream.codec_context.pix_fmt == "yuv420p"
+        assert (stream.codec_context.width, stream.codec_context.height) == (98, 66)
+        assert stream.average_rate == 30
+        assert stream.codec_context.colorspace == 1  # Rec.709
+        shown = [frame.to_ndarray(format="rgb24") / 255 for frame in container.decode(video=0)]
+    assert len(shown) == 5
+    for seen, meant in zip(shown, frames(), strict=True):
+        # away from the edges, where the eye's colours are stored at half the size
+        assert np.abs(seen[5, 4] - meant[5, 4]).max() < 0.03
+        assert np.abs(seen[60, 50] - meant[60, 50]).max() < 0.03
+        assert np.median(np.abs(seen[:, :97] - meant)) < 0.02
+
+
+def test_the_same_frames_are_the_same_bytes(tmp_path: Path) -> None:
+    """Also of sizes that are no multiple of 16, where x264 with its usual settings makes other bytes each time."""
+    kept, contents = [], set()
+    for n in range(8):
+        video.write(tmp_path / "a.mp4", frames(), 24.0)
+        contents.add((tmp_path / "a.mp4").read_bytes())
+        kept.append(np.full(50_000 * (n + 1), n, np.uint8))  # another state of the memory
+    assert len(contents) == 1
+
+
+def test_a_clip_is_read_grey_with_the_lowest_row_first(tmp_path: Path) -> None:
+    video.write(tmp_path / "a.mp4", frames(), 30.0, crf=0)
+    grey = video.read_grey(tmp_path / "a.mp4", "exemplar.file")
+    assert grey.shape == (5, 66, 98) and grey.dtype == np.float32
+    floor, red = 0.2126 * 0.1 + 0.7152 * 0.7 + 0.0722 * 0.2, 0.2126 * 0.9 + (0.7152 + 0.0722) * 0.1
+    assert abs(grey[0, 3, 50] - floor) < 0.02
+    assert abs(grey[0, 60, 4] - red) < 0.02 and grey[0, 60, 80] < 0.02
+    assert abs(grey[4, 60, 40] - red) < 0.02
+
+
+@pytest.mark.parametrize(("given", "crf", "reason"), [
+    ([], 16, "at least one frame"),
+    ([np.zeros((4, 4, 3)), np.zeros((4, 6, 3))], 16, r"frame 2 has shape \(4, 6, 3\)"),
+    ([np.full((4, 4, 3), np.nan)], 16, "NaN"),
+    ([np.zeros((4, 4, 3))], 52, "crf"),
+])
+def test_what_is_no_video_is_refused(tmp_path: Path, given: list[np.ndarray], crf: int, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        video.write(tmp_path / "a.mp4", given, 30.0, crf=crf)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_damaged_clips_are_one_line(tmp_path: Path) -> None:
+    video.write(tmp_path / "whole.mp4", frames(), 30.0)
+    content, cut = (tmp_path / "whole.mp4").read_bytes(), tmp_path / "cut.mp4"
+    for damaged in (b"", content[:40], content[: len(content) // 3], b"no video at all"):
+        cut.write_bytes(damaged)
+        with pytest.raises(BadInput, match=r"cut\.mp4: exemplar\.file: ") as caught:
+            video.read_grey(cut, "exemplar.file")
+        assert "\n" not in str(caught.value)
+    video.write(tmp_path / "one.mp4", frames(1), 30.0)
+    with pytest.raises(BadInput, match="motion needs two"):
+        video.read_grey(tmp_path / "one.mp4", "exemplar.file")
+
+
+def test_a_full_disk_is_noticed(tiny_disk: Path) -> None:
+    draw = np.random.Generator(np.random.Philox(key=1))
+    noise = (draw.random((240, 320, 3), np.float32) for _ in range(8))
+    with pytest.raises(StorageFailed, match="disk"):
+        video.write(tiny_disk / "a.mp4", noise, 30.0, crf=4)
+    assert list(tiny_disk.iterdir()) == []
