@@ -27,8 +27,8 @@ def reference(F_frames, sources, start=None, before=0, border="zero"):
     for i, F in enumerate(F_frames, before + 1):
         density = density.copy()
         for source in sources:
-            box, injected = source.injected(shape, i)
-            density[box] = np.maximum(density[box], injected)
+            box, lowest, highest = source.bounds(shape, i)
+            density[box] = np.minimum(np.maximum(density[box], lowest), highest)
         density = advect_reference(density, F, border=border)
         yield density
 
@@ -148,8 +148,8 @@ def test_density_stays_between_zero_and_the_level(shape):
 
 def whole(source, shape, frame=1):
     density = np.zeros(shape, np.float32)
-    box, injected = source.injected(shape, frame)
-    density[box] = injected
+    box, lowest, _ = source.bounds(shape, frame)
+    density[box] = lowest
     return density
 
 
@@ -171,6 +171,17 @@ def test_an_ellipse_and_a_box_have_their_axes():
     assert ellipse.any(0).sum() > 3 * ellipse.any(1).sum()
     box = whole(Source((0.0, 0.5), 0.25, "box", softness=0.0), (64, 64)) == 1.0
     assert box.sum() == 30**2 and box[17:47, 17:47].all()  # 32 cells wide, the outermost fade
+
+
+def test_a_source_holds_its_pattern_and_lets_go_at_its_edge():
+    source = Source((0.0, 0.5), 0.3, softness=0.5, level=0.7, streaks=0.5, streak_size=0.05)
+    _, lowest, highest = source.bounds((64, 64), 1)
+    assert (lowest <= highest + 1e-7).all() and lowest.min() == 0.0 and highest.max() == 1.0
+    centre = (slice(15, 25), slice(15, 25))
+    np.testing.assert_allclose(lowest[centre], highest[centre], atol=1e-6)
+    assert lowest[centre].min() < 0.55 and 0.6 < lowest[centre].max() <= 0.7
+    _, nothing, anything = Source((0.0, 0.5), 0.3, period=2, duty=0.5).bounds((64, 64), 2)
+    assert not nothing.any() and (anything == 1).all()
 
 
 def test_puffs():

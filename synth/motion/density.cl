@@ -3,15 +3,18 @@
 
 #include "advect.cl"
 
-// Inject a source into every lane: q = max(q, source), over a box of the grid whose first cell is (x0, y0, z0).
-kernel void inject(global float *restrict q, global const float *restrict source, const int x0, const int y0,
-                   const int z0, const int width, const int X, const int Y)
+// Inject a source into every lane: hold q between `lowest` and `highest` in a box of the grid, of size (width, …)
+// and with its first cell at (x0, y0, z0).
+kernel void inject(global float *restrict q, global const float *restrict lowest,
+                   global const float *restrict highest, const int x0, const int y0, const int z0,
+                   const int width, const int X, const int Y)
 {
     const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
     if (x >= width) return;
     const int cell = ((z0 + z) * Y + y0 + y) * X + x0 + x;
-    const float injected = source[(z * (int)get_global_size(1) + y) * width + x];
-    STORE(fmax(LOAD(cell, q), (quantity)(injected)), cell, q);
+    const int here = (z * (int)get_global_size(1) + y) * width + x;
+    const quantity above = fmax(LOAD(cell, q), (quantity)(lowest[here]));
+    STORE(fmin(above, (quantity)(highest[here])), cell, q);
 }
 
 // One step of every lane, out = q carried along d. Lane `take` is copied to `taken`, then lane `put` begins anew

@@ -3,9 +3,9 @@
     O_i = naive(L)_i                                          the smoke under the coarse motion alone
     D_i = O_{i-m}, then m times: inject, advect by F_{i-m+j}   the smoke one sees
 
-Each frame injects first and advects then. A source is injected by maximum, D = max(D, source): its smoke
-never exceeds the source's level, a resting source leaves its own picture, and nothing depends on the frame
-rate.
+Each frame injects first and advects then. A source holds the density at its own pattern p where its mask is
+1, and lets go of it towards its soft edge: mask p <= D <= 1 - mask (1 - p). So smoke never piles up, the
+pattern stays crisp under the smoke that passes, and nothing depends on the frame rate.
 
 Pseudocode 4 restarts each D_i and does m steps for it. Here the m windows that are under way advance side
 by side, one step per frame: the same numbers, bit for bit, with one departure map, no history of fields,
@@ -40,7 +40,7 @@ class Source:
     out)
     softness       share of the radius over which the edge fades, 0 to 1 (at least a cell's width)
     level          density injected, 0 to 1
-    streaks        contrast of seeded streaks across x and z, 0 (even) to 1: they draw the paths of the smoke
+    streaks        contrast of a seeded pattern across x and z, 0 (even) to 1: it draws streaks along the paths
     streak_size    width of a streak
     streak_period  frames in which the streaks change
     period, duty   smoke enters during the share `duty` of every `period` frames (puffs); duty 1 is always
@@ -74,10 +74,11 @@ class Source:
             if not getattr(self, name) > 0:
                 raise ValueError(f"a source's {name} must be positive, not {getattr(self, name)}")
 
-    def injected(self, shape: tuple[int, ...], frame: int) -> tuple[tuple[slice, ...], np.ndarray]:
-        """What enters before frame `frame` (from 1) is advected, on a grid of (Y, X) or (Z, Y, X) cells.
+    def bounds(self, shape: tuple[int, ...], frame: int) -> tuple[tuple[slice, ...], np.ndarray, np.ndarray]:
+        """What the density is held between before frame `frame` (from 1) is advected.
 
-        Returns the box of cells it touches and its density there, float32.
+        shape is the density grid's, (Y, X) or (Z, Y, X) cells. Returns the box of cells the source touches,
+        and there the lowest and the highest density, float32 in [0, 1].
         """
         voxel = 1.0 / shape[-2]
         radii = self.radius if isinstance(self.radius, tuple) else (self.radius,) * 3
@@ -96,9 +97,11 @@ class Source:
             np.broadcast_arrays(*grid))
         edge = max(self.softness, min(1.0, voxel / min(radii)))
         inside = np.clip((1 - far) / edge, 0, 1)
-        density = self.level * inside * inside * (3 - 2 * inside) * self._streaks(shape, box, frame)
-        on = (frame - 1) % self.period < self.duty * self.period
-        return tuple(box[::-1]), (density if on else 0 * density).astype(np.float32)
+        mask = inside * inside * (3 - 2 * inside)
+        if (frame - 1) % self.period >= self.duty * self.period:
+            mask = np.zeros_like(mask)
+        lowest = mask * self.level * self._streaks(shape, box, frame)
+        return tuple(box[::-1]), lowest.astype(np.float32), (1 - mask + lowest).astype(np.float32)
 
     def _streaks(self, shape: tuple[int, ...], box: list[slice], frame: int) -> np.ndarray | float:
         """Factor 1 - streaks to 1, constant along y, over the box's cells."""
@@ -118,7 +121,7 @@ def naive(F_frames: Iterable[np.ndarray], sources: Sequence[Source], *, scale: f
     """Pseudocode 3: D_i = (D_{i-1} with the sources) advected by F_i, from an empty D_0.
 
     F_frames  F_1, F_2, … (Y, X, 2) or (Z, Y, X, 3) float32, cells per frame
-    sources   what enters; D = max(D, each of them)
+    sources   what enters, one after the other
     scale     cells of the density grid per cell of the field, along each axis; F is then interpolated
     smoothly
               (Catmull and Rom)
@@ -204,14 +207,14 @@ class _Lanes:
                                        BORDER=BORDERS[border])
 
     def inject(self, sources: Sequence[Source], frame: int) -> None:
-        """q = max(q, source) in every lane, for each source."""
+        """Every source in turn, into every lane."""
         for source in sources:
-            box, density = source.injected(self.shape, frame)
+            box, lowest, highest = source.bounds(self.shape, frame)
             corner = [s.start for s in box[::-1]] + [0] * (3 - len(box))
-            size = [*density.shape[::-1], 1][:3]
+            size = [*lowest.shape[::-1], 1][:3]
             sizes = [np.int32(n) for n in (*corner, size[0], self.shape[-1], self.shape[-2])]
             self._program.inject((-(-size[0] // ROW) * ROW, *size[1:]), (ROW, 1, 1), self.q,
-                                 opencl.to_device(density), *sizes)
+                                 opencl.to_device(lowest), opencl.to_device(highest), *sizes)
 
     def departure(self, v: np.ndarray, field_shape: tuple[int, ...]) -> Any:
         """Displacements by `v` on this grid: linearly to the field's cells, smoothly on to the density's."""
