@@ -24,20 +24,19 @@ inline float2 sample(__global const float2 *exemplar, int pitch, float2 at) {
     return sum + wy.w * (wx.x * e[0] + wx.y * e[1] + wx.z * e[2] + wx.w * e[3]);
 }
 
-// exemplar continued by BORDER; position (S) where a site's match lies in it; weight (S); frame at the sites
-// (S); prior (Y, X) float2 with its weight in z (float4 for alignment): the frame before, warped
+// exemplar continued by BORDER; position (S) where a site's match lies in it; weight (S); axis (S), the frame at
+// the sites; prior (Y, X): the frame before, warped.
 __kernel void average(__global const float2 *exemplar, int pitch, __global const float2 *position,
                       __global const float *weight, __global const float2 *axis, int2 grid, float falloff,
-                      __global const float4 *prior, __global float2 *out) {
+                      __global const float2 *prior, float coherence, __global float2 *out) {
     const int x = get_global_id(0), y = get_global_id(1), width = get_global_size(0);
     const float reach = 1.41421357f * RADIUS;
     const int left = max(0, (int)ceil((x - reach - FIRST) / SPACING));
     const int right = min(grid.x - 1, (int)floor((x + reach - FIRST) / SPACING));
     const int bottom = max(0, (int)ceil((y - reach - FIRST) / SPACING));
     const int top = min(grid.y - 1, (int)floor((y + reach - FIRST) / SPACING));
-    const float4 before = prior[y * width + x];
-    float2 sum = before.z * before.xy;
-    float total = before.z;
+    float2 sum = (float2)(0.0f);
+    float total = 0.0f;
     for (int gy = bottom; gy <= top; gy++)
         for (int gx = left; gx <= right; gx++) {
             const int s = gy * grid.x + gx;
@@ -45,9 +44,20 @@ __kernel void average(__global const float2 *exemplar, int pitch, __global const
             const float2 e = axis[s];
             const float2 o = (float2)(e.x * way.x + e.y * way.y, e.x * way.y - e.y * way.x);
             if (max(fabs(o.x), fabs(o.y)) > RADIUS + 0.001f) continue;
-            const float w = weight[s] * exp(-falloff * dot(o, o));
-            sum += w * sample(exemplar, pitch, position[s] + o);
-            total += w;
+            const float g = exp(-falloff * dot(o, o));
+            sum += g * weight[s] * sample(exemplar, pitch, position[s] + o);
+            total += g * weight[s];
         }
-    out[y * width + x] = total > 0.0f ? sum / total : (float2)(0.0f);
+    const float2 before = prior[y * width + x];
+    out[y * width + x] = total > 0.0f ? (sum / total + coherence * before) / (1.0f + coherence) : before;
+}
+
+// The frame before, carried by the flow: field continued by BORDER, displacement (Y, X) to where each cell's
+// content comes from. Linear interpolation, a little every frame, would wear the detail down.
+__kernel void carry(__global const float2 *field, int pitch, __global const float2 *displacement,
+                    __global float2 *out) {
+    const int x = get_global_id(0), y = get_global_id(1), width = get_global_size(0);
+    const float2 last = (float2)(width - 1, get_global_size(1) - 1);
+    const float2 at = clamp((float2)(x, y) + displacement[y * width + x], (float2)(0.0f), last);
+    out[y * width + x] = sample(field, pitch, at);
 }

@@ -34,18 +34,33 @@ def continued(exemplar: np.ndarray, border: int) -> np.ndarray:
 
 
 def average(exemplar: np.ndarray, position: Any, weight: np.ndarray, axis: Any, grid: tuple[int, int], radius: int,
-            spacing: int, prior: np.ndarray) -> np.ndarray:
-    """Least squares (Eq. 1): the minimum over x of sum_p w_p |x_p - z_p|^2 + w |x - prior|^2, cell by cell.
+            spacing: int, prior: Any, coherence: float) -> Any:
+    """Least squares (Eq. 1), cell by cell: the minimum over x of sum_p w_p |x_p - z_p|^2 + O(x).
 
-    exemplar (N, M, 2); position (S, 2) device, where the matches' centres lie in it; weight (S,) float32;
-    axis (S, 2) device, the local x axis of each site; grid (rows, columns) of sites, `spacing` apart;
-    prior (Y, X, 4): x, y, weight, unused -> (Y, X, 2) float32.
+    O(x) = w |x - prior|^2 with w = coherence * (sum of w_p there), the frame coherence of [Kwatra 2005 §5].
+    exemplar (N, M, 2); position (S, 2), where the matches' centres lie in it; weight (S,) float32 host array;
+    axis (S, 2), the local x axis of each site; grid (rows, columns) of sites, `spacing` apart;
+    prior (Y, X, 2): device array in, device array (Y, X, 2) out.
     """
     border = radius + 3
     program = opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=radius, SPACING=spacing, FIRST=spacing // 2,
                              BORDER=border)
-    out = opencl.empty((*prior.shape[:2], 2))
+    out = opencl.empty(prior.shape)
     program.average(prior.shape[1::-1], None, opencl.to_device(continued(exemplar, border)),
                     np.int32(exemplar.shape[1] + 2 * border), position, opencl.to_device(weight), axis,
-                    np.array(grid[::-1], np.int32), falloff(radius), opencl.to_device(prior), out)
+                    np.array(grid[::-1], np.int32), falloff(radius), prior, np.float32(coherence), out)
+    return out
+
+
+def carry(field: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+    """The frame before, moved by the flow (§3.4): field (Y, X, 2) at each cell + displacement (Y, X, 2) in cells.
+
+    Catmull-Rom, clamped at the border; displacement as `synth.advect.departure` gives it.
+    """
+    border = 2
+    program = opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=0, SPACING=1, FIRST=0, BORDER=border)
+    out = opencl.empty(field.shape)
+    padded = np.pad(field, ((border, border), (border, border), (0, 0)), mode="edge")
+    program.carry(field.shape[1::-1], None, opencl.to_device(padded), np.int32(padded.shape[1]),
+                  opencl.to_device(displacement), out)
     return out.get()

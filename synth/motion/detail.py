@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from synth import opencl, pyramid
-from synth.advect import advect
+from synth.advect import departure
 from synth.motion import assignment, initialize, neighborhood
 from synth.motion.frames import local_frame
 from synth.motion.search import Matcher
@@ -29,8 +29,8 @@ MARGIN = 8
 COARSEST = 8
 # mosaics tried for the first frame
 STARTS = 8
-# how strongly a frame holds to the one before, advected; one match that fits exactly counts one
-COHERENCE = 2.0
+# how strongly a frame holds to the one before, advected; 1 is as much as all matches together
+COHERENCE = 1.0
 
 
 @dataclass(frozen=True)
@@ -64,12 +64,12 @@ class Level:
         return [Matcher(neighborhood.space(self.exemplar, width // 2), self.exemplar.shape[:2], self.settings.k)
                 for width in self.settings.neighborhoods]
 
-    def optimize(self, H: np.ndarray, frame: np.ndarray, weight: float) -> tuple[np.ndarray, float]:
+    def optimize(self, H: np.ndarray, frame: np.ndarray, coherence: float) -> tuple[np.ndarray, float]:
         """Search and assign, round after round; returns H (Y, X, 2) and the mean distance of its last matches.
 
-        `weight` is that of H as it came (the frame before, warped): the O(x) of Eq. 1.
+        `coherence` holds the result to H as it came (the frame before, warped): the O(x) of Eq. 1.
         """
-        prior = np.concatenate([H, np.full_like(H, weight)], axis=-1)
+        prior = opencl.to_device(H)
         distance = np.zeros(1, np.float32)
         for matcher in self.matchers:
             radius = matcher.space.radius
@@ -83,7 +83,7 @@ class Level:
                 distance = squared.get() / length
                 weights = assignment.robust_weights(distance, self.rms)
                 H = assignment.average(self.exemplar, matcher.refine(queries, match), weights, axis, grid, radius,
-                                       spacing, prior)
+                                       spacing, prior, coherence).get()
         return H, float(np.mean(np.sqrt(distance))) / self.rms
 
     def _search(self, matcher: Matcher, queries: Any, sites: np.ndarray, axis: Any, grid: tuple[int, int],
@@ -121,7 +121,7 @@ class Synthesis:
             for level, frame in zip(self.levels[1:], frames[1:], strict=True):
                 done.append(level.optimize(_finer(done[-1], frame.shape[:2]), frame, 0.0)[0])
             return done
-        warped = [advect(H, motion) for H, motion in zip(state, motions, strict=True)]
+        warped = [assignment.carry(H, departure(motion)) for H, motion in zip(state, motions, strict=True)]
         done = [self.levels[0].optimize(warped[0], frames[0], COHERENCE)[0]]
         for i in range(1, len(self.levels)):
             # what the coarser level changed, on top of what flowed here
