@@ -35,6 +35,7 @@ app = App(
 )
 
 SceneFile = Annotated[Path, Parameter(help="The scene, a TOML file.")]
+SceneFiles = Annotated[Path, Parameter(help="Scenes, TOML files; without any, all the project's.")]
 Quick = Annotated[bool, Parameter(negative="", help="Small and fast: the scene's [quick] overrides; writes OUT/quick.")]
 Out = Annotated[Path, Parameter(help="Where X/fields, X/geometry, X/images and X.png are written.")]
 Quiet = Annotated[bool, Parameter(negative="", help="No progress.")]
@@ -76,6 +77,32 @@ def render(scene: SceneFile, /, *, frames: FrameRange = None, quick: Quick = Fal
 def figure(scene: SceneFile, /, *, quick: Quick = False, out: Out = OUT, quiet: Quiet = False) -> None:
     """Set the figure: OUT/X/X.png and OUT/X/X.mp4, running whatever stage is not up to date."""
     _run("figure", scene, quick, out, quiet)
+
+
+@app.command
+def diff(*scenes: SceneFiles, out: Out = OUT, quiet: Quiet = False) -> int:
+    """Check that scenes still give, at their quick settings, what their references keep; else exit 1."""
+    from pipeline import diff as checking
+    from pipeline.listing import project_scenes
+    from pipeline.progress import Progress
+
+    differs = False
+    for scene in scenes or project_scenes():
+        lines = checking.check(scene, out, Progress(quiet))
+        print(*(lines or [f"{scene.stem}: the same"]), sep="\n")
+        differs = differs or bool(lines)
+    return int(differs)
+
+
+@app.command
+def references(*scenes: SceneFiles, out: Out = OUT, quiet: Quiet = False) -> None:
+    """Keep what scenes give at their quick settings as the references that `diff` compares with."""
+    from pipeline import references as keeping
+    from pipeline.listing import project_scenes
+    from pipeline.progress import Progress
+
+    for scene in scenes or project_scenes():
+        print(keeping.write(scene, out, Progress(quiet)))
 
 
 @app.command(name="list")

@@ -9,6 +9,7 @@ A difference that is meant becomes the new reference by `flowloom references`; l
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +20,7 @@ import numpy as np
 from pipeline import references, stages
 from pipeline.files import images
 from pipeline.progress import Progress
+from pipeline.scene import load
 
 SUM_TOLERANCE = 1e-6  # of a frame's sums, relative to the sum of its absolute values
 VALUE_TOLERANCE = 1e-5  # of any value, relative to the frame's largest
@@ -50,7 +52,8 @@ def compared_sums(name: str, new: dict[str, Any], old: dict[str, Any]) -> Findin
     scale = max(old["absolute"], float(np.finfo(np.float64).tiny))
     worst = max(abs(new[key] - old[key]) for key in ("sum", "absolute")) / scale
     measured = f"sums {worst:.2g} apart"
-    return Finding(name, "" if worst <= SUM_TOLERANCE else f"{measured}, {SUM_TOLERANCE:g} may be", measured)
+    fault = "" if worst <= SUM_TOLERANCE else f"{measured}, tolerance {SUM_TOLERANCE:g}"
+    return Finding(name, fault, measured)
 
 
 def compared_values(name: str, new: np.ndarray, old: np.ndarray) -> Finding:
@@ -61,7 +64,7 @@ def compared_values(name: str, new: np.ndarray, old: np.ndarray) -> Finding:
     scale = max(float(np.abs(old).max()), float(np.finfo(np.float32).tiny))
     worst = float(np.abs(new.astype(np.float64) - old).max()) / scale
     measured = f"largest difference {worst:.2g} of the largest value"
-    fault = "" if worst <= VALUE_TOLERANCE else f"{measured}, {VALUE_TOLERANCE:g} may be"
+    fault = "" if worst <= VALUE_TOLERANCE else f"{measured}, tolerance {VALUE_TOLERANCE:g}"
     both = [part for part in (overall.fault, fault) if part]
     return Finding(name, "; ".join(both), f"{overall.measured}; {measured}", old, new)
 
@@ -76,27 +79,37 @@ def compared_light(name: str, new: np.ndarray, old: np.ndarray) -> Finding:
     differs = ~(relative <= PIXEL_TOLERANCE).all(axis=-1)  # not >: a pixel that is no number differs
     share = float(differs.mean())
     measured = f"{share:.2%} of the pixels differ by more than {PIXEL_TOLERANCE:g}"
-    fault = "" if share <= PIXEL_SHARE else f"{measured}, {PIXEL_SHARE:.1%} may"
+    fault = "" if share <= PIXEL_SHARE else f"{measured}, tolerance {PIXEL_SHARE:.1%}"
     return Finding(name, fault, measured, old, new, is_light=True)
 
 
 def check(scene_file: Path, out: Path, progress: Progress) -> list[str]:
-    """Run a scene at its [quick] settings and compare; one line per difference, none if it is the same.
+    """Run a scene at its [quick] settings and compare; one line per product that differs, none if none does.
 
     Writes the report out/quick/X/diff/index.html with its picture. Raises BadInput if there is no reference,
     and what the stages raise.
     """
     from pipeline import evidence
 
+    load(scene_file, quick=True)  # a scene that is not there lacks more than a reference
     record = references.record_of(scene_file)
     works = references.baked(scene_file, out, progress)
     found = list(findings(works, references.folder_of(scene_file), record))
     page = evidence.write(scene_file.stem, found, works.root / "diff")
-    lines = [f"{scene_file.stem}: {finding.name}: {finding.fault}" for finding in found if finding.fault]
+    lines = [f"{scene_file.stem}: {line}" for line in _first_of_each([f for f in found if f.fault])]
     if lines:
         meant = f"if it is meant, type: flowloom references {scene_file}"
         lines.append(f"{scene_file.stem}: look at {page}; {meant}")
     return lines
+
+
+def _first_of_each(faults: list[Finding]) -> Iterator[str]:
+    """One line for each product: its first frame that differs, and how many more do."""
+    products: dict[str, list[Finding]] = {}
+    for fault in faults:
+        products.setdefault(re.sub(r"\.\d{4,}\.", ".", fault.name), []).append(fault)
+    for first, *more in products.values():
+        yield f"{first.name}: {first.fault}" + (f"; so do {len(more)} more frames" if more else "")
 
 
 def findings(works: stages.Works, folder: Path, record: dict[str, Any]) -> Iterator[Finding]:

@@ -10,6 +10,11 @@ from pipeline.scene import load
 from pipeline.schema import PROJECT_SCENES
 
 
+def project_scenes() -> list[Path]:
+    """The project's scenes."""
+    return sorted(PROJECT_SCENES.glob("*.toml"))
+
+
 def lines(folder: Path | None, out: Path) -> Iterator[str]:
     """One line per scene: its name, its source, its title; a star if its figure is in `out`."""
     files = sorted((folder or PROJECT_SCENES).glob("*.toml"))

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from pipeline import diff, references
+from pipeline import cli, diff, references
 from pipeline.errors import BadInput
 from pipeline.progress import Progress
 
@@ -100,9 +100,8 @@ def test_keeping_the_same_again_touches_nothing(scene):
 def test_one_per_cent_denser_smoke_differs(scene):
     change(scene, "radius = 0.3", "radius = 0.3\nlevel = 0.99")
     lines = check(scene)
-    densities = [f"geometry/density.000{n}.exr" for n in (1, 2, 3)]
-    assert [line.split(": ")[1] for line in lines[:-1]] == [*densities, "images/proof.exr"]
-    assert "sums 0.01 apart" in lines[0] and "largest difference 0.01" in lines[2] and "pixels" in lines[3]
+    assert [line.split(": ")[1] for line in lines[:-1]] == ["geometry/density.0001.exr", "images/proof.exr"]
+    assert "sums 0.01 apart" in lines[0] and "so do 2 more frames" in lines[0] and "pixels" in lines[1]
     assert "index.html" in lines[-1] and "flowloom references" in lines[-1]
     assert "4 of" in (scene / "out" / "quick" / "wind" / "diff" / "index.html").read_text()
     assert "kept in" in keep(scene) and check(scene) == []  # it was meant
@@ -118,8 +117,8 @@ def test_another_seed_differs_from_the_fields_on(scene):
 def test_other_products_are_told(scene):
     change(scene, "[quick]", '[variants.a]\n[variants.b]\n"density.m" = 1\n[quick]')
     lines = check(scene)
-    assert any("geometry/b/density.0003.exr: is new" in line for line in lines)
-    assert any("geometry/density.0003.exr: is no longer made" in line for line in lines)
+    assert any("geometry/b/density.0001.exr: is new" in line for line in lines)
+    assert any("geometry/density.0001.exr: is no longer made" in line for line in lines)
     keep(scene)
     assert check(scene) == []
     assert not (scene / "references" / "wind" / "geometry" / "density.0003.exr").exists()
@@ -147,6 +146,21 @@ def test_damaged_reference_is_not_compared_with(scene, name):
     file.write_bytes(file.read_bytes()[:-9])
     with pytest.raises(BadInput, match="is damaged; check it out anew, or type: flowloom references"):
         check(scene)
+
+
+def test_commands_and_their_exit_codes(scene, capsys):
+    """0 the same, 1 differs, 2 nothing to compare with, 4 nowhere to write."""
+    file, out = str(scene / "wind.toml"), ["--out", str(scene / "out"), "--quiet"]
+    assert cli.run(["diff", file, *out]) == 0 and "wind: the same" in capsys.readouterr().out
+    change(scene, "radius = 0.3", "radius = 0.31")
+    assert cli.run(["diff", file, *out]) == 1 and "density.0001.exr" in capsys.readouterr().out
+    assert cli.run(["references", file, *out]) == 0 and cli.run(["diff", file, *out]) == 0
+    shutil.rmtree(scene / "references")
+    assert cli.run(["diff", file, *out]) == 2 and "type: flowloom references" in capsys.readouterr().err
+    assert cli.run(["diff", file.replace("wind", "none"), *out]) == 2
+    assert "no such scene" in capsys.readouterr().err
+    (scene / "references").write_text("in the way")
+    assert cli.run(["references", file, *out]) == 4 and "references" in capsys.readouterr().err
 
 
 def test_references_of_the_project_stand_with_its_tests():
