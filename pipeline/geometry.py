@@ -1,6 +1,7 @@
 """What bake makes, in out/X/geometry: the final motion F and the smoke density, in world units.
 
-F is 2-D, an EXR. The density is what F carries: an EXR too.
+The density is carried by F as it is computed from L and H, not by the files of F: so any frame can be baked
+alone, by any machine of a farm.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def make_density(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tupl
     """The density. A few frames of many are made one by one, which gives the same bits as all in a row."""
     wanted = scene.density
     last = frames[-1]
-    F = (_cells(scene, stock, "F", frame) for frame in range(1, last + 1))
+    F = (final_motion(scene, stock, frame) for frame in range(1, last + 1))
     settings: dict[str, Any] = {"scale": wanted.scale, "border": wanted.border}
     if wanted.scheme == "naive":
         every = _naive(scene, F, settings)
@@ -52,16 +53,11 @@ def make_density(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tupl
     else:
         from synth.motion.density import windowed
 
-        L = (_cells(scene, stock, "L", frame) for frame in range(1, last + 1))
+        L = (stock.read("L", frame).per_frame(scene.fps).values for frame in range(1, last + 1))
         every = windowed(L, F, _sources(scene), wanted.m, **settings)
     for frame, values in enumerate(every, start=1):
         if frame in frames:
             yield frame, Field.centred(values, values.ndim)
-
-
-def _cells(scene: Scene, stock: Stock, name: str, frame: int) -> np.ndarray:
-    """L on its own grid or F, cells per frame."""
-    return stock.read(name, frame).per_frame(scene.fps).values
 
 
 def _sources(scene: Scene) -> list[Any]:
@@ -84,23 +80,21 @@ def _naive(scene: Scene, motion: Iterator[np.ndarray], settings: dict[str, Any])
 def _single_windows(scene: Scene, stock: Stock, frames: list[int], settings: dict[str, Any],
                     ) -> Iterator[tuple[int, Field]]:
     """Frame by frame, each from O_{i-m} (pseudocode 4): for a farm, and for a file that was lost."""
+    m = scene.density.m
+    ends = {frame - m: frame for frame in frames if frame > m}
+    for frame in frames:
+        if frame <= m:
+            yield frame, _window(scene, stock, None, frame, settings)
+    coarse = (coarse_cells(scene, stock, frame) for frame in range(1, max(ends, default=0) + 1))
+    for start, O in enumerate(_naive(scene, coarse, settings), start=1):
+        if start in ends:
+            yield ends[start], _window(scene, stock, O, ends[start], settings)
+
+
+def _window(scene: Scene, stock: Stock, O: np.ndarray | None, frame: int, settings: dict[str, Any]) -> Field:
     from synth.motion.density import window
 
-    m = scene.density.m
-    starts = {max(frame - m, 0): frame for frame in frames}
-    coarse = (coarse_cells(scene, stock, frame) for frame in range(1, max(starts) + 1))
-    smoke: Iterator[np.ndarray | None] = _naive(scene, coarse, settings)
-    first = [frame for frame in frames if frame <= m]
-    for frame in first:
-        yield frame, _window(scene, stock, window, None, frame, settings)
-    for start, O in enumerate(smoke, start=1):
-        if start in starts:
-            yield starts[start], _window(scene, stock, window, O, starts[start], settings)
-
-
-def _window(scene: Scene, stock: Stock, window: Any, O: np.ndarray | None, frame: int,
-            settings: dict[str, Any]) -> Field:
-    motion = [_cells(scene, stock, "F", i) for i in range(max(frame - scene.density.m, 0) + 1, frame + 1)]
+    motion = [final_motion(scene, stock, i) for i in range(max(frame - scene.density.m, 0) + 1, frame + 1)]
     values = window(O, motion, _sources(scene), frame, **settings)
     return Field.centred(values, values.ndim)
 
@@ -113,6 +107,6 @@ def products(scene: Scene) -> tuple[Product, ...]:
         make=make_final, write=write_field, read=read_field)
     density = Product(
         name="density", stage="bake", folder="geometry", suffix=exr,
-        reads=("density", "detail.size", "seed", "fps"), inputs=(("L", "until"), ("F", "until")),
-        methods=("synth.motion.density", "synth.field"), make=make_density, write=write_field, read=read_field)
+        reads=("density", "combine", "detail.size", "seed", "fps"), inputs=(("L", "until"), ("H", "until")),
+        methods=("synth.motion.density", "synth.motion.combine", "synth.motion.frames", "synth.field"), make=make_density, write=write_field, read=read_field)
     return (final,) if scene.render.kind == "none" else (final, density)

@@ -32,10 +32,11 @@ def _file(module: str) -> Path:
     return ROOT.joinpath(*module.split(".")).with_suffix(".py")
 
 
+@functools.cache
 def _imported(file: Path) -> list[str]:
     """The modules of PACKAGES that `file` imports, at its top or inside a function."""
     names: list[str] = []
-    for node in ast.walk(ast.parse(file.read_text())):
+    for node in ast.walk(_tree(file)):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -48,9 +49,17 @@ def _imported(file: Path) -> list[str]:
 def digest(maker: str, methods: tuple[str, ...]) -> str:
     """SHA-256 of what module `maker` by itself, and `methods` with all they depend on, say to the machine."""
     files = {_file(maker), *(file for method in methods for file in sources(method))}
-    whole = hashlib.sha256()
-    for file in sorted(files):
-        text = file.read_text()
-        whole.update(file.relative_to(ROOT).as_posix().encode())
-        whole.update(ast.dump(ast.parse(text)).encode() if file.suffix == ".py" else text.encode())
-    return whole.hexdigest()
+    said = [f"{file.relative_to(ROOT).as_posix()} {_said(file)}" for file in sorted(files)]
+    return hashlib.sha256("\n".join(said).encode()).hexdigest()
+
+
+@functools.cache
+def _said(file: Path) -> str:
+    """SHA-256 of a file's content; of Python that of its syntax tree, which comments are not part of."""
+    text = file.read_text()
+    return hashlib.sha256((ast.dump(_tree(file)) if file.suffix == ".py" else text).encode()).hexdigest()
+
+
+@functools.cache
+def _tree(file: Path) -> ast.Module:
+    return ast.parse(file.read_text())

@@ -93,7 +93,7 @@ class Works:
                 return None
             tables = product.tables(self.scenes.variants[variant])
             code = sources.digest(product.make.__module__, product.methods)
-            self._keys[file.parent, file.name] = manifest.digest([name, tables, code, hashes])
+            self._keys[file.parent, file.name] = manifest.digest([name, frame, tables, code, hashes])
         return self._keys[file.parent, file.name]
 
     def _chain(self, variant: str, name: str, frame: int) -> str | None:
