@@ -23,21 +23,23 @@ def drawn(*shape: int) -> np.ndarray:
 
 @pytest.mark.parametrize("shape", [(1, 1), (2, 3), (5, 7), (64, 48)])
 def test_channels_come_back(tmp_path: Path, shape: tuple[int, int]) -> None:
-    channels = {"R": drawn(*shape), "Z": numbered(*shape), "albedo.R": -drawn(*shape), "N.X": drawn(*shape) * 1e30}
-    images.write(tmp_path / "a.exr", channels, metadata={"seed": "12345678901234567890", "about": '{"m": 16}'})
+    some = drawn(*shape)
+    channels = {"R": some, "Z": numbered(*shape), "albedo.R": -some, "N.X": some * 1e30}
+    about = {"seed": "12345678901234567890", "about": '{"m": 16}'}
+    images.write(tmp_path / "a.exr", channels, metadata=about)
     back = images.read(tmp_path / "a.exr")
     assert back.keys() == channels.keys()
     for name, values in channels.items():
         assert back[name].dtype == np.float32 and np.array_equal(back[name], values)
-    texts = images.metadata(tmp_path / "a.exr")
-    assert texts["seed"] == "12345678901234567890" and texts["about"] == '{"m": 16}'
+    assert about.items() <= images.metadata(tmp_path / "a.exr").items()
     assert [p.name for p in tmp_path.iterdir()] == ["a.exr"]
 
 
 def test_views_are_written_as_they_look(tmp_path: Path) -> None:
     """OpenEXR itself writes other pixels from these, and says nothing (openexr issue 1929)."""
     rgba = drawn(6, 8, 4)
-    for view in (rgba[..., :3], rgba[::-1, ::2, :3], rgba.transpose(1, 0, 2)[..., 1:], np.asfortranarray(rgba)):
+    turned = rgba.transpose(1, 0, 2)
+    for view in (rgba[..., :3], rgba[::-1, ::2, :3], turned[..., 1:], np.asfortranarray(rgba)):
         images.write_picture(tmp_path / "a.exr", view)
         assert np.array_equal(images.read_picture(tmp_path / "a.exr"), view[..., :3])
 
@@ -70,7 +72,8 @@ def test_fields_come_back_with_their_place(tmp_path: Path, components: tuple[int
 def test_another_programs_field_lies_on_our_domain(tmp_path: Path) -> None:
     x, y = numbered(4, 8), -numbered(4, 8)
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    OpenEXR.File(header, {"x": x.astype(np.float16), "y": y.astype(np.float16)}).write(str(tmp_path / "a.exr"))
+    halves = {"x": x.astype(np.float16), "y": y.astype(np.float16)}
+    OpenEXR.File(header, halves).write(str(tmp_path / "a.exr"))
     field = images.read_foreign_field(tmp_path / "a.exr", "coarse.file")
     assert field == Field.centred(np.stack([x[::-1], y[::-1]], axis=-1), 2)
 
@@ -94,7 +97,8 @@ def test_half_floats(tmp_path: Path) -> None:
     ({"x": np.zeros((2, 2)), "y": np.zeros((2, 3))}, "one size"),
     ({"x": np.zeros((2, 2, 3))}, "not (h, w)"),
 ])
-def test_what_cannot_be_stored_is_refused(tmp_path: Path, channels: dict[str, np.ndarray], reason: str) -> None:
+def test_what_cannot_be_stored_is_refused(tmp_path: Path, channels: dict[str, np.ndarray],
+                                          reason: str) -> None:
     with pytest.raises(ValueError) as caught:
         images.write(tmp_path / "a.exr", channels, half=True)
     assert reason in str(caught.value)
@@ -132,7 +136,7 @@ def test_a_foreign_field_with_infinity_is_refused(tmp_path: Path) -> None:
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     x = np.full((2, 2), np.inf, np.float32)
     OpenEXR.File(header, {"x": x, "y": x.copy()}).write(str(tmp_path / "a.exr"))
-    with pytest.raises(BadInput, match="coarse.file: the field holds NaN or infinity"):
+    with pytest.raises(BadInput, match=r"coarse\.file: the field holds NaN or infinity"):
         images.read_foreign_field(tmp_path / "a.exr", "coarse.file")
 
 

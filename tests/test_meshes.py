@@ -31,7 +31,8 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     (VERTICES[:, :2], FACES, r"shape \(n, 3\)"),
     (VERTICES, FACES[:0], "n > 0"),
 ])
-def test_what_is_no_mesh_is_refused(tmp_path: Path, vertices: np.ndarray, faces: np.ndarray, reason: str) -> None:
+def test_what_is_no_mesh_is_refused(tmp_path: Path, vertices: np.ndarray, faces: np.ndarray,
+                                    reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         meshes.write(tmp_path / "a.ply", vertices, faces)
     assert list(tmp_path.iterdir()) == []

@@ -40,7 +40,7 @@ def test_colours_and_places_come_back(tmp_path: Path) -> None:
 
 
 def test_the_same_frames_are_the_same_bytes(tmp_path: Path) -> None:
-    """Also of sizes that are no multiple of 16, where x264 with its usual settings makes other bytes each time."""
+    """Also of sizes that are no multiple of 16, where x264 as it comes makes other bytes each time."""
     kept, contents = [], set()
     for n in range(8):
         video.write(tmp_path / "a.mp4", frames(), 24.0)
