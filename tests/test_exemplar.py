@@ -287,6 +287,15 @@ def test_drawing_reads_transparent_and_wide_pictures():
     assert at(from_drawing(wide, 64), 0.5, 0.5) == pytest.approx([1, 0], abs=0.02)
 
 
+def test_drawing_of_any_size_is_the_same():
+    """A scan of 2048 pixels, in colour or grey, gives what 512 pixels give."""
+    small = drawing(LEVEL, UPRIGHT, size=512)
+    large = np.kron(small, np.ones((4, 4, 1), np.uint8))
+    for channels in (slice(None), 0):
+        v = from_drawing(large[..., channels], 64)
+        np.testing.assert_allclose(v, from_drawing(small, 64), atol=0.12)
+
+
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">{}</svg>'
 
 

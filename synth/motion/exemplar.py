@@ -31,6 +31,7 @@ SMALLEST = 8
 MOTIF_EXTENT = 0.78  # of the tile; the margin keeps neighbouring motifs apart
 EDGE_SAMPLES = 16  # quadrature points on each cell edge
 STROKE_REACH = 0.08  # of the tile: where the flow beside a thin stroke has died away
+DRAWING_PIXELS = 1024  # a drawing with a longer side is reduced to it: more shows no finer strokes
 INK = 0.25  # how far a pixel's tone, 0 to 1, is from the paper's to count as ink
 SVG_CHARACTERS, SVG_SEGMENTS = 1_000_000, 20_000  # more is an attack or a mistake
 
@@ -313,10 +314,17 @@ def _bounds(strokes: Sequence[Floats]) -> tuple[Floats, Floats]:
 
 def _ink(picture: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Where the drawing has ink and where that is red, both (S, S), the picture centred on square paper."""
+    import cv2
+
     tones = _tones(picture)
     tones = _checked(tones[..., None] if tones.ndim == 2 else tones, 3, "the drawing")
     if tones.shape[2] not in (1, 3, 4):
         raise ValueError(f"the drawing has {tones.shape[2]} channels; 1, 3 or 4 are known")
+    largest = max(tones.shape[:2])
+    if largest > DRAWING_PIXELS:
+        share = DRAWING_PIXELS / largest
+        tones = cv2.resize(tones, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
+        tones = tones.reshape(*tones.shape[:2], -1)  # OpenCV drops a single channel's axis
     opacity = tones[..., 3:] if tones.shape[2] == 4 else 1.0
     colour = np.broadcast_to(tones[..., :3] * opacity + (1 - opacity), (*tones.shape[:2], 3))
     red = colour[..., 0] - colour[..., 1:].max(-1) > 2 * INK
