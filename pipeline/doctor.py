@@ -1,7 +1,7 @@
 """`flowloom doctor`: tries what a render needs, each in a child process, and says in a line what it found.
 
-A trial is a function that does the thing, small, and returns what it did it with; what it raises, or its death
-or silence, is the reason why the thing is missing.
+A trial is a function that does the thing, small, and returns what it did it with; what it raises, its death
+or its silence is the reason why the thing is missing.
 """
 
 from __future__ import annotations
@@ -76,11 +76,11 @@ def mitsuba_scalar() -> str:
 
 def openvdb() -> str:
     """Writes a volume and reads it back."""
-    from pipeline.files import _openvdb, volumes
+    from pipeline.files import volumes
     from synth.field import Field
 
     volumes.write(Path("trial.vdb"), {"density": Field(np.ones((2, 3, 4)), 0.5, (-1.0, 0.0, 1.0))})
-    return f"OpenVDB {_openvdb.version}"
+    return f"OpenVDB {volumes.library_version()}"
 
 
 def openexr() -> str:
@@ -118,7 +118,7 @@ class Trial:
 
 TRIALS = (
     Trial("machine", machine),
-    Trial("OpenCL", opencl, "apt-get install pocl-opencl-icd ocl-icd-libopencl1"),
+    Trial("OpenCL", opencl, "apt-get install pocl-opencl-icd"),
     Trial("Mitsuba, LLVM", mitsuba_llvm, "apt-get install libllvm19"),
     Trial("Mitsuba, scalar", mitsuba_scalar),
     Trial("OpenVDB", openvdb, "apt-get install libopenvdb-dev, then make setup"),
@@ -155,7 +155,8 @@ def run() -> None:
         if works:
             print(f"ok       {trial.name:16s} {told}", flush=True)
         else:
-            print(f"MISSING  {trial.name:16s} {told}; to mend it: {trial.mending}", flush=True)
+            mending = "" if trial.mending in told else f"; to mend it: {trial.mending}"
+            print(f"MISSING  {trial.name:16s} {told}{mending}", flush=True)
             missing.append(trial.name)
     if missing:
         raise EnvironmentMissing(f"missing: {'; '.join(missing)}")

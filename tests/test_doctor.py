@@ -9,7 +9,7 @@ import pytest
 
 from pipeline import doctor
 from pipeline.errors import EnvironmentMissing
-from pipeline.files import _openvdb
+from pipeline.files import volumes
 from render import backend
 
 TRIALS = """
@@ -66,7 +66,7 @@ def test_this_machine_is_well(capsys: pytest.CaptureFixture[str]) -> None:
     told = capsys.readouterr().out
     assert len(told.splitlines()) == len(doctor.TRIALS)
     assert f"({backend.llvm_library()})" in told
-    assert f"OpenVDB {_openvdb.version}" in told
+    assert f"OpenVDB {volumes.library_version()}" in told
     assert "OpenEXR 3.5.3" in told
 
 

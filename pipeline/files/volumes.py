@@ -84,6 +84,13 @@ def _check(path: Path, temporary: Path, fields: Mapping[str, Field], half: bool)
             raise StorageFailed(path, f"grid '{name}' did not read back as it was written; is the disk full?")
 
 
+def library_version() -> str:
+    """The version of the OpenVDB library."""
+    from pipeline.files import _openvdb
+
+    return _openvdb.version
+
+
 def read(path: Path) -> dict[str, Field]:
     """The fields of a file that `write` made, by name. Raises `BadInput` if it is missing or damaged.
 
