@@ -105,6 +105,22 @@ def references(*scenes: SceneFiles, out: Out = OUT, quiet: Quiet = False) -> Non
         print(keeping.write(scene, out, Progress(quiet)))
 
 
+@app.command
+def doctor() -> None:
+    """Try what a render needs, each in a child process: what was found, and how to mend what is missing."""
+    from pipeline import doctor as examination
+
+    examination.run()
+
+
+@app.command
+def gallery(*, out: Out = OUT) -> None:
+    """Write OUT/gallery.html: every figure there is, with its animation."""
+    from pipeline import gallery as exhibition
+
+    print(exhibition.write(out))
+
+
 @app.command(name="list")
 def list_(folder: Annotated[Path | None, Parameter(help="A folder of scenes; else the project's.")] = None, /, *,
           out: Out = OUT) -> None:

@@ -7,11 +7,12 @@ without re-synthesis.
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from pipeline.files import atomic, images, pictures, volumes
 from pipeline.product import Product, Stock
 from pipeline.schema import Scene
 from synth.field import Field
+
+if TYPE_CHECKING:
+    from synth.motion.detail import State
 
 
 def exr(scene: Scene) -> str:
@@ -124,23 +128,32 @@ def coarse_cells(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
 STATE = "H.state.npz"
 
 
-def _keep(stock: Stock, frame: int, state: list[np.ndarray]) -> None:
-    """Keep what frame + 1 is made from."""
+def _keep(stock: Stock, frame: int, state: State) -> None:
+    """Keep what frame + 1 is made from: each list of arrays of the state, by its name and their numbers."""
+    arrays = {f"{field.name}.{level}": values
+              for field in dataclasses.fields(state) for level, values in enumerate(getattr(state, field.name))}
     content = io.BytesIO()
-    np.savez(content, frame=frame, key=stock.key(frame), **{f"level{i}": H for i, H in enumerate(state)})
+    np.savez(content, allow_pickle=False, **{"frame": np.array(frame), "key": np.array(stock.key(frame)), **arrays})
     atomic.write_bytes(stock.work / STATE, content.getvalue())
 
 
-def _kept(stock: Stock, first: int) -> tuple[int, list[np.ndarray] | None]:
+def _kept(stock: Stock, first: int) -> tuple[int, State | None]:
     """The last frame before `first` whose state is kept, and the state; (0, None) if there is none."""
+    from synth.motion.detail import State
+
+    lists: dict[str, list[np.ndarray]] = {field.name: [] for field in dataclasses.fields(State)}
     try:
         with np.load(stock.work / STATE, allow_pickle=False) as kept:
             frame = int(kept["frame"])
-            if 0 < frame < first and kept["key"] == stock.key(frame):
-                return frame, [kept[f"level{i}"] for i in range(len(kept.files) - 2)]
+            if not 0 < frame < first or str(kept["key"]) != stock.key(frame):
+                return 0, None
+            for name in kept.files:
+                field, _, level = name.rpartition(".")
+                if field:
+                    lists[field].insert(int(level), kept[name])
+            return frame, State(**lists)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        pass  # none, or one that a crash of the machine damaged: the frames are made again from the first
-    return 0, None
+        return 0, None  # none, or damaged by a crash of the machine: the frames are made again from the first
 
 
 PRODUCTS = (

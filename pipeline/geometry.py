@@ -6,12 +6,15 @@ alone, by any machine of a farm.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipeline.fields import coarse_cells, exr, read_field, write_field
+from pipeline.files import volumes
 from pipeline.product import Product, Stock
 from pipeline.schema import Scene
 from synth.field import Field
@@ -39,22 +42,31 @@ def make_final(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[
         yield frame, Field.centred(final_motion(scene, stock, frame), 2).per_second(scene.fps)
 
 
+def _motions(scene: Scene, stock: Stock, frame: int) -> tuple[np.ndarray, np.ndarray]:
+    """L and F, each in cells per frame of its own grid: in the plane, or carried into a volume with depth."""
+    L, F = stock.read("L", frame).per_frame(scene.fps).values, final_motion(scene, stock, frame)
+    if scene.density.depth is None:
+        return L, F
+    from synth.motion.depth import deepen
+
+    return deepen(L, F, scene.density.depth.layers, scene.density.depth.lean)
+
+
 def make_density(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
     """The density. A few frames of many are made one by one, which gives the same bits as all in a row."""
     wanted = scene.density
     last = frames[-1]
-    F = (final_motion(scene, stock, frame) for frame in range(1, last + 1))
     settings: dict[str, Any] = {"scale": wanted.scale, "border": wanted.border}
     if wanted.scheme == "naive":
-        every = _naive(scene, F, settings)
+        every = _naive(scene, (_motions(scene, stock, frame)[1] for frame in range(1, last + 1)), settings)
     elif len(frames) * wanted.m <= last:
         yield from _single_windows(scene, stock, frames, settings)
         return
     else:
         from synth.motion.density import windowed
 
-        L = (stock.read("L", frame).per_frame(scene.fps).values for frame in range(1, last + 1))
-        every = windowed(L, F, _sources(scene), wanted.m, **settings)
+        both = itertools.tee(_motions(scene, stock, frame) for frame in range(1, last + 1))
+        every = windowed((L for L, _ in both[0]), (F for _, F in both[1]), _sources(scene), wanted.m, **settings)
     for frame, values in enumerate(every, start=1):
         if frame in frames:
             yield frame, Field.centred(values, values.ndim)
@@ -85,18 +97,43 @@ def _single_windows(scene: Scene, stock: Stock, frames: list[int], settings: dic
     for frame in frames:
         if frame <= m:
             yield frame, _window(scene, stock, None, frame, settings)
-    coarse = (coarse_cells(scene, stock, frame) for frame in range(1, max(ends, default=0) + 1))
+    coarse = (_coarse_alone(scene, stock, frame) for frame in range(1, max(ends, default=0) + 1))
     for start, O in enumerate(_naive(scene, coarse, settings), start=1):
         if start in ends:
             yield ends[start], _window(scene, stock, O, ends[start], settings)
 
 
+def _coarse_alone(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
+    """L on the cells of F, in the plane or with depth."""
+    from synth.motion.coarse import upsample
+
+    L, F = _motions(scene, stock, frame)
+    return upsample(L, F.shape[:-1])
+
+
 def _window(scene: Scene, stock: Stock, O: np.ndarray | None, frame: int, settings: dict[str, Any]) -> Field:
     from synth.motion.density import window
 
-    motion = [final_motion(scene, stock, i) for i in range(max(frame - scene.density.m, 0) + 1, frame + 1)]
+    motion = [_motions(scene, stock, i)[1] for i in range(max(frame - scene.density.m, 0) + 1, frame + 1)]
     values = window(O, motion, _sources(scene), frame, **settings)
     return Field.centred(values, values.ndim)
+
+
+def _suffix(scene: Scene) -> str:
+    return "exr" if scene.density.depth is None else "vdb"
+
+
+def write_density(file: Path, field: Field, scene: Scene) -> None:
+    """Write a density: 2-D as EXR, 3-D as VDB grid `density`."""
+    if field.dimension == 2:
+        write_field(file, field, scene)
+    else:
+        volumes.write(file, {"density": field})
+
+
+def read_density(file: Path, scene: Scene) -> Field:
+    """Read a density that `write_density` wrote."""
+    return read_field(file, scene) if scene.density.depth is None else volumes.read(file)["density"]
 
 
 def products(scene: Scene) -> tuple[Product, ...]:
@@ -106,7 +143,8 @@ def products(scene: Scene) -> tuple[Product, ...]:
         inputs=(("L", "same"), ("H", "same")), methods=("synth.motion.combine", "synth.motion.frames", "synth.field"),
         make=make_final, write=write_field, read=read_field)
     density = Product(
-        name="density", stage="bake", folder="geometry", suffix=exr,
+        name="density", stage="bake", folder="geometry", suffix=_suffix,
         reads=("density", "combine", "detail.size", "seed", "fps"), inputs=(("L", "until"), ("H", "until")),
-        methods=("synth.motion.density", "synth.motion.combine", "synth.motion.frames", "synth.field"), make=make_density, write=write_field, read=read_field)
+        methods=("synth.motion.density", "synth.motion.depth", "synth.motion.combine", "synth.motion.frames", "synth.field"), make=make_density, write=write_density,
+        read=read_density)
     return (final,) if scene.render.kind == "none" else (final, density)

@@ -56,7 +56,7 @@ def make_beauty(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
                 yield frame, smoke.volume(
                     density.values, density.voxel_size, density.origin, smoke.VolumeSettings(
                         width=settings.width, height=settings.height, spp=settings.spp, seed=scene.seed,
-                        extinction=settings.extinction, bowl=settings.bowl))
+                        denoised=settings.denoised, extinction=settings.extinction, bowl=settings.bowl))
 
 
 def make_input(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:

@@ -202,8 +202,8 @@ def _reason(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
             return str(context["error"])
         case _:
             message = functools.reduce(lambda text, pair: text.replace(*pair), WORDS, fault["msg"])
-            kinds = {dict: "a table", list: "an array"}
-            return f"{message[0].lower()}{message[1:]}, not {kinds.get(type(given)) or repr(given)}"
+            shown = {dict: "a table", list: "an array"}.get(type(given)) or repr(given)
+            return f"{message[0].lower()}{message[1:]}, not {shown}"
 
 
 def _did_you_mean(given: str, known: Any) -> str:
@@ -222,6 +222,9 @@ def _fault_between_tables(scene: Scene) -> tuple[str, str]:
         return "detail.size", f"{columns}×{rows} has not the shape of coarse.size, {coarse}"
     if isinstance(detail.levels, int) and exemplar.size >> (detail.levels - 1) < 4:
         return "detail.levels", f"{detail.levels} levels bring an exemplar of {exemplar.size}² below 4 cells"
+    if (scene.density.depth is not None) != (scene.render.kind == "volume") and scene.render.kind != "none":
+        need = "needs a [density.depth]" if scene.render.kind == "volume" else "draws no volume, but density.depth is"
+        return "render.kind", f'"{scene.render.kind}" {need}'
     if scene.figure.frame > scene.frames:
         return "figure.frame", f"the animation has {scene.frames} frames"
     return "", ""

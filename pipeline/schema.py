@@ -188,6 +188,13 @@ class Source(Table):
     duty: float = key("share of the period during which smoke enters", 1.0, ge=0, le=1)
 
 
+class Depth(Table):
+    """The plane motion carried into a volume: L revolved about the vertical axis, the detail laid through it."""
+
+    layers: int = key("cells of F's grid along z", 128, "cells", ge=4, le=LARGEST)
+    lean: float = key("shift of the detail along x per unit of depth; 0: straight through", 0.0, ge=-10, le=10)
+
+
 class Density(Table):
     """The smoke carried by F (supplement A)."""
 
@@ -198,6 +205,7 @@ class Density(Table):
                                                        "side", "zero")
     sources: Annotated[tuple[Source, ...], Strict(False)] = key(
         "where smoke enters, an array of tables [[density.sources]]", (Source(),), min_length=1, max_length=64)
+    depth: Depth | None = key("makes the density a volume, for [render] kind = \"volume\"", None)
 
 
 class LitRender(Table):
@@ -222,7 +230,8 @@ class VolumeRender(Table):
     width: int = key("of the picture", 512, "pixels", ge=16, le=LARGEST)
     height: int = key("of the picture", 640, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
-    extinction: float = key("of smoke of density 1", 60.0, "per height", gt=0, le=10000)
+    denoised: bool = key("fit the paths to guides without noise", True)
+    extinction: float = key("of smoke of density 1", 80.0, "per height", gt=0, le=10000)
     bowl: Annotated[tuple[Annotated[float, Field(gt=0, le=1)], Annotated[float, Field(gt=0, le=1)]],
                     Strict(False)] | None = key("radius and height of the bowl that the plume rises from", None, "heights")
 
@@ -255,7 +264,7 @@ class Scene(Table):
 
     title: str = key("what the figure shows", min_length=1, max_length=200)
     source: str = key("the figure it reproduces or what it is made after", "", max_length=200)
-    seed: int = key("of every random choice", 1, ge=0, le=2**63 - 1)
+    seed: int = key("of every random choice", 1, ge=0, le=2**31 - 1)
     frames: int = key("length of the animation", 90, "frames", ge=1, le=100000)
     fps: float = key("speed of the animation", 30, "frames per second", gt=0, le=1000)
     exemplar: ProceduralExemplar | BitmapExemplar | DrawingExemplar | FieldExemplar | ClipExemplar = Field(discriminator="kind")
