@@ -101,7 +101,8 @@ def proof_settings(render: Any) -> Any:
     width = min(PROOF_WIDTH, render.width)
     small: dict[str, Any] = {"width": width}
     if render.kind == "volume":
-        small |= {"height": round(render.height * width / render.width), "spp": PROOF_SAMPLES}
+        height = round(render.height * width / render.width)
+        small |= {"height": height, "spp": PROOF_SAMPLES, "denoised": False}
     return render.model_copy(update=small)
 
 
@@ -136,7 +137,7 @@ def made_with(kind: str) -> dict[str, str]:
     if kind == "volume":
         from render import backend
 
-        return backend.versions("scalar_rgb")
+        return {"llvm": "none", **backend.versions("scalar_rgb")}  # a scalar variant does without
     return {name: importlib.metadata.version(name) for name in ("numpy", "scipy")}
 
 

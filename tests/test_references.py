@@ -80,7 +80,7 @@ def test_reference_is_small_and_says_what_it_is(kept):
 
 def test_volume_proofs_name_what_renders_them():
     versions = references.made_with("volume")
-    assert {"variant", "mitsuba", "drjit"} <= set(versions) and versions["mitsuba"] == "3.9.1"
+    assert set(versions) == {"variant", "mitsuba", "drjit", "llvm"} and versions["mitsuba"] == "3.9.1"
 
 
 def test_unchanged_scene_is_the_same(scene):
@@ -112,6 +112,17 @@ def test_another_seed_differs_from_the_fields_on(scene):
     named = " ".join(check(scene))
     assert all(name in named for name in ("L.0001", "H.0001", "F.0001", "density.0001", "proof"))
     assert "exemplar.exr" not in named
+
+
+def test_volume_is_told_by_its_content_and_its_path_traced_proof(tmp_path):
+    text = SCENE.replace('kind = "lit"', 'kind = "volume"\nheight = 64')
+    text = text.replace("m = 2", "m = 2\nscale = 1\ndepth = { layers = 24 }").replace("[0.0, 0.5]", "[0, 0.5, 0]")
+    (tmp_path / "wind.toml").write_text(text)
+    keep(tmp_path)
+    assert check(tmp_path) == []
+    change(tmp_path, "radius = 0.3", "radius = 0.3\nlevel = 0.99")
+    smoke, proof, _ = check(tmp_path)
+    assert "density.0001.vdb" in smoke and "sums 0.01 apart" in smoke and "images/proof.exr" in proof
 
 
 def test_other_products_are_told(scene):
