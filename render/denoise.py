@@ -27,7 +27,7 @@ RIDGE = 1e-3  # of a guide's variance in the whole picture
 def depth_towards(sigma: np.ndarray, towards: tuple[float, float, float]) -> np.ndarray:
     """Optical depth (Z, Y, X) from each cell to the border of the grid along the unit vector (x, y, z).
 
-    sigma: (Z, Y, X) float32, extinction per cell. As `smoke.depth_towards`, one dimension up.
+    sigma: (Z, Y, X) float32, extinction per cell. As `sheet.depth_towards`, one dimension up.
     """
     main = int(np.argmax(np.abs(towards)))
     axis = 2 - main  # of the array: its axes are z, y, x

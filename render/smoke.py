@@ -17,16 +17,17 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, denoise, lic, studio
+from render import backend, denoise, lic, sheet, studio
 
 # The lit sheet. Lengths are shares of the picture's height, so a scene looks the same at any width.
-LAYERS = 20  # front to back
 THICKNESS = 0.075  # about the size of one motif
 OPTICAL_DEPTH = 7.0  # through the whole sheet where density and relief are 1
 DENSITY_POWER = 1.3  # above 1: thin smoke is thinner than linear, and edges read finer
 BODY, DETAIL = 0.035, 0.012  # blur radii that tell the plume's body from its detail
-KEY_LIGHT = np.array([1.00, 0.92, 0.82], np.float32) * 1.36  # warm, from the upper left, in front
-RIM_LIGHT = np.array([0.45, 0.68, 1.00], np.float32) * 1.04  # cool, from the right, behind
+KEY = sheet.Lamp(sheet.directions(125.0, 12.0, 3), slope=2.2, density=1.6)  # from the upper left, in front
+RIM = sheet.Lamp(sheet.directions(30.0, 12.0, 2), slope=1.2, density=0.8, behind=True)  # from the right
+KEY_LIGHT = np.array([1.00, 0.92, 0.82], np.float32) * 1.36  # warm
+RIM_LIGHT = np.array([0.45, 0.68, 1.00], np.float32) * 1.04  # cool
 SKY_LIGHT = np.array([0.42, 0.50, 0.66], np.float32) * 0.16  # from the front, everywhere
 BACKDROP_CENTRE = np.array([0.034, 0.044, 0.066], np.float32)
 BACKDROP_EDGE = np.array([0.009, 0.012, 0.019], np.float32)
@@ -63,48 +64,6 @@ def checked_density(density: np.ndarray, dimensions: int) -> np.ndarray:
     return density
 
 
-def depth_towards(sigma: np.ndarray, towards: tuple[float, float]) -> np.ndarray:
-    """Optical depth (Y, X) from each cell to the border along the unit vector `towards` = (x, y).
-
-    sigma: (Y, X) float32, extinction per cell. One sweep over the rows (or columns), away from the light; the
-    linear interpolation between rows softens the shadow with distance, as a large light does.
-    """
-    if abs(towards[0]) > abs(towards[1]):
-        return depth_towards(sigma.T, (towards[1], towards[0])).T
-    if towards[1] < 0.0:
-        return depth_towards(sigma[::-1], (towards[0], -towards[1]))[::-1]
-    step = np.float32(1.0 / towards[1])
-    slope = np.float32(towards[0] * step)  # columns per row, at most 1
-    side, share = (1, slope) if slope >= 0.0 else (-1, -slope)
-    depth = np.zeros((sigma.shape[0], sigma.shape[1] + 2), np.float32)
-    half = np.pad(sigma, ((0, 0), (1, 1))) * (np.float32(0.5) * step)
-    inner, beside = slice(1, -1), slice(1 + side, sigma.shape[1] + 1 + side)
-    for row in range(sigma.shape[0] - 2, -1, -1):
-        passed = depth[row + 1] + half[row + 1]
-        depth[row, inner] = (1 - share) * passed[inner] + share * passed[beside] + half[row, inner]
-    return depth[:, inner]
-
-
-def directions(angle: float, spread: float, count: int) -> list[tuple[float, float]]:
-    """`count` unit vectors (x, y) round `angle`, over `spread` each way; degrees, counter-clockwise from +x.
-
-    A few directions stand in for the area of a light: their shadows overlap to a soft one.
-    """
-    angles = np.deg2rad(np.linspace(angle - spread, angle + spread, count))
-    return [(float(np.cos(a)), float(np.sin(a))) for a in angles]
-
-
-def _moved(values: np.ndarray, dx: float, dy: float, outside: float) -> np.ndarray:
-    """`values` (Y, X) read at (x + dx, y + dy), linear, `outside` beyond the border."""
-    ix, iy = int(np.floor(dx)), int(np.floor(dy))
-    fx, fy = np.float32(dx - ix), np.float32(dy - iy)
-    rim = max(abs(ix), abs(iy)) + 2
-    (h, w), padded = values.shape, np.pad(values, rim, constant_values=outside)
-    window = padded[rim + iy:rim + iy + h + 1, rim + ix:rim + ix + w + 1]
-    across = window[:, :-1] * (1 - fx) + window[:, 1:] * fx
-    return across[:-1] * (1 - fy) + across[1:] * fy
-
-
 def _relief(rho: np.ndarray) -> np.ndarray:
     """Half thickness (Y, X) of the sheet, 1 = full: a rounded body that carries the detail of the density.
 
@@ -112,56 +71,17 @@ def _relief(rho: np.ndarray) -> np.ndarray:
     an opaque sheet would hide, into slopes that catch the light.
     """
     height = rho.shape[0]
-    body = np.sqrt(np.clip(ndimage.gaussian_filter(rho, BODY * height), 0.0, 1.0))
+    body = np.sqrt(np.clip(ndimage.gaussian_filter(rho, BODY * height, truncate=2.5), 0.0, 1.0))
     detail = rho - ndimage.gaussian_filter(rho, DETAIL * height)
     edge = np.sqrt(np.clip(rho / 0.25, 0.0, 1.0))
     return np.clip(0.75 * body * edge + 0.25 * rho + 1.5 * detail, 0.0, 1.2)
-
-
-def _layers(rho: np.ndarray) -> np.ndarray:
-    """Optical depth (LAYERS, Y, X) of each layer of the sheet, seen straight on, front first."""
-    z = 2.0 * (np.arange(LAYERS, dtype=np.float32) + 0.5) / LAYERS - 1.0
-    inside = np.clip((_relief(rho) - np.abs(z)[:, None, None]) * (LAYERS / 2.5) + 0.5, 0.0, 1.0)
-    return (OPTICAL_DEPTH / LAYERS) * rho**DENSITY_POWER * inside
-
-
-def _shining_through(layers: np.ndarray, seen: np.ndarray, towards: list[tuple[float, float]], slope: float,
-                     density: float) -> np.ndarray:
-    """What the eye sees (Y, X) of a light that crosses the layers aslant, in the order they are given in.
-
-    layers, seen: (LAYERS, Y, X), optical depth and the eye's weight; slope: cells across per cell of depth;
-    density: factor on the optical depth. Of the light 0.6 dies by the full extinction, 0.4 by a quarter of
-    it: scattered again and again it reaches deeper than one exponential says (Wrenninge 2013).
-    """
-    across = THICKNESS * layers.shape[1] / LAYERS * slope
-    slant = np.float32(density * np.hypot(1.0, slope))
-    total = np.zeros_like(layers[0])
-    for x, y in towards:
-        first, deep = np.full_like(total, 0.6), np.full_like(total, 0.4)
-        for layer, weight in zip(layers, seen, strict=True):
-            half = np.exp(-0.5 * slant * layer)
-            half_deep = np.sqrt(np.sqrt(half))
-            total += weight * (first * half + deep * half_deep)
-            first = _moved(first * half * half, x * across, y * across, 0.6)
-            deep = _moved(deep * half_deep * half_deep, x * across, y * across, 0.4)
-    return total / len(towards)
-
-
-def _sky(layers: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """What the eye sees (Y, X) of a light from all over the front, which spreads as it sinks in."""
-    cone = int(0.012 * layers.shape[1]) | 1
-    total, light = np.zeros_like(layers[0]), np.ones_like(layers[0])
-    for layer, weight in zip(layers, seen, strict=True):
-        total += weight * light * np.exp(-0.35 * layer)
-        light = ndimage.uniform_filter(light * np.exp(-0.7 * layer), cone, mode="nearest")
-    return total
 
 
 def _in_plane(rho: np.ndarray, towards: Iterable[tuple[float, float]], density: float,
               least: float) -> np.ndarray:
     """Share (Y, X) of a light left after the smoke's whole width: the large shadow of the plume on itself."""
     sigma = rho * np.float32(density / rho.shape[0])
-    shares = np.stack([np.exp(-depth_towards(sigma, d)) for d in towards])
+    shares = np.stack([np.exp(-sheet.depth_towards(sigma, d)) for d in towards])
     return np.asarray(least + (1.0 - least) * shares.mean(axis=0))
 
 
@@ -183,16 +103,15 @@ def lit(density: np.ndarray, width: int) -> np.ndarray:
     density = checked_density(density, 2)
     height = lic.height_for(density.shape, width)
     rho = lic.resampled(density, height, width)  # linear: cubic leaves dark halos
-    layers = _layers(rho)
-    passed = np.exp(-np.cumsum(layers, axis=0))
-    seen = np.concatenate([1.0 - passed[:1], passed[:-1] - passed[1:]])
-    key = _shining_through(layers, seen, directions(125.0, 12.0, 3), 2.2, 1.6)
-    rim = _shining_through(layers[::-1], seen[::-1], directions(30.0, 12.0, 2), 1.2, 0.8)
-    key *= _in_plane(rho, directions(125.0, 20.0, 3), 6.0, 0.12)
-    rim *= _in_plane(rho, directions(30.0, 20.0, 3), 9.0, 0.05)
-    sky = _sky(layers, seen) * _in_plane(rho, directions(90.0, 60.0, 3), 2.0, 0.3)
-    shadow = ndimage.gaussian_filter(_moved(passed[-1], -0.05 * height, 0.06 * height, 1.0), 0.03 * height)
-    light = passed[-1][..., None] * _backdrop(height, width) * (0.35 + 0.65 * shadow)[..., None]
+    layer = THICKNESS * height / sheet.LAYERS
+    seen = sheet.light(OPTICAL_DEPTH * rho**np.float32(DENSITY_POWER), _relief(rho), layer, (KEY, RIM),
+                       cone=round(0.006 * height))
+    key = seen.lamps[0] * _in_plane(rho, sheet.directions(125.0, 20.0, 3), 6.0, 0.12)
+    rim = seen.lamps[1] * _in_plane(rho, sheet.directions(30.0, 20.0, 3), 9.0, 0.05)
+    sky = seen.sky * _in_plane(rho, sheet.directions(90.0, 60.0, 3), 2.0, 0.3)
+    shadow = ndimage.gaussian_filter(sheet.moved(seen.passed, -0.05 * height, 0.06 * height, 1.0), 0.03 * height,
+                                     truncate=2.5)
+    light = seen.passed[..., None] * _backdrop(height, width) * (0.35 + 0.65 * shadow)[..., None]
     light += key[..., None] * KEY_LIGHT + rim[..., None] * RIM_LIGHT + sky[..., None] * SKY_LIGHT
     return light[::-1].copy()
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from render import denoise, smoke, studio
+from render import denoise, sheet, smoke, studio
 from render.denoise import Grid
 
 
@@ -24,10 +24,10 @@ def test_depth_grows_linearly_towards_each_side(axes: tuple[int, int, int]) -> N
 
 
 def test_depth_of_a_sheet_is_that_of_the_flat_smoke() -> None:
-    """Light in the plane of a flat field: the same numbers as `smoke.depth_towards`."""
+    """Light in the plane of a flat field: the same numbers as `sheet.depth_towards`."""
     flat = np.abs(noise(12, 14)).astype(np.float32)
     depth = denoise.depth_towards(np.repeat(flat[None], 3, axis=0), (0.6, 0.8, 0.0))
-    assert depth[1] == pytest.approx(smoke.depth_towards(flat, (0.6, 0.8)), rel=1e-4, abs=1e-4)
+    assert depth[1] == pytest.approx(sheet.depth_towards(flat, (0.6, 0.8)), rel=1e-4, abs=1e-4)
 
 
 def slab(cells: int = 8) -> Grid:
@@ -97,7 +97,7 @@ def test_nothing_gets_darker_than_black() -> None:
 
 
 def test_a_render_of_two_paths_comes_near_one_of_many() -> None:
-    """The studio with a cloud in a bowl: the error falls to a third or less, the mean stays."""
+    """The studio with a cloud in a bowl: the error falls to a third."""
     z, y, x = np.mgrid[-1:1:12j, -1:1:24j, -1:1:16j]
     cloud = np.clip(1.2 - np.hypot(np.hypot(x, y), z) + 0.3 * np.sin(7 * x) * np.cos(6 * y), 0.0, 1.0)
     placed = (cloud.astype(np.float32), 0.035, (-0.26, 0.1, -0.2))

@@ -8,27 +8,6 @@ from render import backend, smoke, studio
 CAMERA = studio.Camera(position=(0.0, 0.0, 8.0), target=(0.0, 0.0, 0.0), fov=4.0)
 
 
-def test_depth_of_a_uniform_slab_grows_linearly_with_the_way_through_it() -> None:
-    """depth = sigma * rows above (half a cell less), straight and aslant, from either side."""
-    sigma = np.full((20, 60), 0.1, np.float32)
-    up = smoke.depth_towards(sigma, (0.0, 1.0))
-    assert up[:, 30] == pytest.approx(0.1 * np.arange(19, -1, -1), abs=1e-5)
-    down = smoke.depth_towards(sigma, (0.0, -1.0))
-    assert np.allclose(down, up[::-1])
-    aslant = smoke.depth_towards(sigma, (0.6, 0.8))
-    assert aslant[0, 20] == pytest.approx(1.9 / 0.8, rel=1e-4)
-    assert np.allclose(smoke.depth_towards(sigma.T, (1.0, 0.0)), up.T)
-
-
-def test_shadow_falls_away_from_the_light() -> None:
-    """A small cloud lit from the upper right darkens what lies to its lower left, and nothing else."""
-    sigma = np.zeros((41, 41), np.float32)
-    sigma[18:23, 18:23] = 0.3
-    depth = smoke.depth_towards(sigma, (np.sqrt(0.5), np.sqrt(0.5)))
-    assert depth[10, 10] > 1.0
-    assert depth[30, 30] == depth[30, 10] == depth[10, 30] == 0.0
-
-
 @pytest.mark.parametrize("colour", smoke.INKS)
 def test_ink_is_beer_lambert(colour: str) -> None:
     """Against blank paper of the same grain: transmittance exp(-density * absorbance), exactly."""
