@@ -28,7 +28,8 @@ inline float2 sample(__global const float2 *exemplar, int pitch, float2 at) {
 // the sites; prior (Y, X): the frame before, warped.
 __kernel void average(__global const float2 *exemplar, int pitch, __global const float2 *position,
                       __global const float *weight, __global const float2 *axis, int2 grid, float falloff,
-                      __global const float2 *prior, float coherence, __global float2 *out) {
+                      __global const float2 *prior, __global const float *coherence,
+                      __global float2 *out) {
     const int x = get_global_id(0), y = get_global_id(1), width = get_global_size(0);
     const float reach = 1.41421357f * RADIUS;
     const int left = max(0, (int)ceil((x - reach - FIRST) / SPACING));
@@ -49,7 +50,8 @@ __kernel void average(__global const float2 *exemplar, int pitch, __global const
             total += g * weight[s];
         }
     const float2 before = prior[y * width + x];
-    out[y * width + x] = total > 0.0f ? (sum / total + coherence * before) / (1.0f + coherence) : before;
+    const float hold = coherence[y * width + x];
+    out[y * width + x] = total > 0.0f ? (sum / total + hold * before) / (1.0f + hold) : before;
 }
 
 // The frame before, carried by the flow: field continued by BORDER, displacement (Y, X) to where each cell's

@@ -34,13 +34,13 @@ def continued(exemplar: np.ndarray, border: int) -> np.ndarray:
 
 
 def average(exemplar: np.ndarray, position: Any, weight: np.ndarray, axis: Any, grid: tuple[int, int], radius: int,
-            spacing: int, prior: Any, coherence: float) -> Any:
+            spacing: int, prior: Any, coherence: Any) -> Any:
     """Least squares (Eq. 1), cell by cell: the minimum over x of sum_p w_p |x_p - z_p|^2 + O(x).
 
     O(x) = w |x - prior|^2 with w = coherence * (sum of w_p there), the frame coherence of [Kwatra 2005 §5].
     exemplar (N, M, 2); position (S, 2), where the matches' centres lie in it; weight (S,) float32 host array;
     axis (S, 2), the local x axis of each site; grid (rows, columns) of sites, `spacing` apart;
-    prior (Y, X, 2): device array in, device array (Y, X, 2) out.
+    prior (Y, X, 2), coherence (Y, X). Device arrays in, device array (Y, X, 2) out.
     """
     border = radius + 3
     program = opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=radius, SPACING=spacing, FIRST=spacing // 2,
@@ -48,7 +48,7 @@ def average(exemplar: np.ndarray, position: Any, weight: np.ndarray, axis: Any, 
     out = opencl.empty(prior.shape)
     program.average(prior.shape[1::-1], None, opencl.to_device(continued(exemplar, border)),
                     np.int32(exemplar.shape[1] + 2 * border), position, opencl.to_device(weight), axis,
-                    np.array(grid[::-1], np.int32), falloff(radius), prior, np.float32(coherence), out)
+                    np.array(grid[::-1], np.int32), falloff(radius), prior, coherence, out)
     return out
 
 

@@ -30,7 +30,9 @@ COARSEST = 8
 # mosaics tried for the first frame
 STARTS = 8
 # how strongly a frame holds to the one before, advected; 1 is as much as all matches together
-COHERENCE = 1.0
+COHERENCE = 6.0
+# the deformation in one frame, relative to the local frame, that halves this hold
+DEFORMED = 0.02
 
 
 @dataclass(frozen=True)
@@ -64,12 +66,12 @@ class Level:
         return [Matcher(neighborhood.space(self.exemplar, width // 2), self.exemplar.shape[:2], self.settings.k)
                 for width in self.settings.neighborhoods]
 
-    def optimize(self, H: np.ndarray, frame: np.ndarray, coherence: float) -> tuple[np.ndarray, float]:
+    def optimize(self, H: np.ndarray, frame: np.ndarray, coherence: np.ndarray) -> tuple[np.ndarray, float]:
         """Search and assign, round after round; returns H (Y, X, 2) and the mean distance of its last matches.
 
         `coherence` holds the result to H as it came (the frame before, warped): the O(x) of Eq. 1.
         """
-        prior = opencl.to_device(H)
+        prior, hold = opencl.to_device(H), opencl.to_device(coherence)
         distance = np.zeros(1, np.float32)
         for matcher in self.matchers:
             radius = matcher.space.radius
@@ -83,7 +85,7 @@ class Level:
                 distance = squared.get() / length
                 weights = assignment.robust_weights(distance, self.rms)
                 H = assignment.average(self.exemplar, matcher.refine(queries, match), weights, axis, grid, radius,
-                                       spacing, prior, coherence).get()
+                                       spacing, prior, hold).get()
         return H, float(np.mean(np.sqrt(distance))) / self.rms
 
     def _search(self, matcher: Matcher, queries: Any, sites: np.ndarray, axis: Any, grid: tuple[int, int],
@@ -94,8 +96,16 @@ class Level:
         return matcher.coherent(queries, opencl.to_device(sites), axis, grid, match)
 
 
+@dataclass(frozen=True)
+class State:
+    """All that the next frame needs: H and the local frame of each level, coarsest first, with their margins."""
+
+    H: list[np.ndarray]
+    frame: list[np.ndarray]
+
+
 class Synthesis:
-    """Synthesizes H frame by frame; `state` after a frame is all that the next one needs.
+    """Synthesizes H frame by frame.
 
     exemplar (N, M, 2) float32; shape (Y, X) of the output.
     """
@@ -107,11 +117,8 @@ class Synthesis:
         self.levels = [Level(I, rms, settings) for I in pyramid.pyramid(exemplar, settings.levels, toroidal=True)]
         self.shape, self.seed = shape, seed
 
-    def frame(self, L: np.ndarray, state: list[np.ndarray] | None) -> list[np.ndarray]:
-        """The state after the frame with coarse motion L (Y, X, 2) cells per frame; None before the first.
-
-        A state holds H of each level, coarsest first, with its margin.
-        """
+    def frame(self, L: np.ndarray, state: State | None) -> State:
+        """The state after the frame with coarse motion L (Y, X, 2) cells per frame; None before the first."""
         motions = [np.pad(motion / np.float32(2 ** (len(self.levels) - 1 - i)),
                           ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="edge")
                    for i, motion in enumerate(pyramid.pyramid(L, len(self.levels), toroidal=False))]
@@ -119,19 +126,25 @@ class Synthesis:
         if state is None:
             done = [self._start(frames[0])]
             for level, frame in zip(self.levels[1:], frames[1:], strict=True):
-                done.append(level.optimize(_finer(done[-1], frame.shape[:2]), frame, 0.0)[0])
-            return done
-        warped = [assignment.carry(H, departure(motion)) for H, motion in zip(state, motions, strict=True)]
-        done = [self.levels[0].optimize(warped[0], frames[0], COHERENCE)[0]]
-        for i in range(1, len(self.levels)):
-            # what the coarser level changed, on top of what flowed here
-            change = _finer(done[-1] - warped[i - 1], warped[i].shape[:2])
-            done.append(self.levels[i].optimize(warped[i] + change, frames[i], COHERENCE)[0])
-        return done
+                H = initialize.reseed(_finer(done[-1], frame.shape[:2]), level.exemplar, frame)
+                done.append(level.optimize(H, frame, free(frame))[0])
+            return State(done, frames)
+        ways = [departure(motion) for motion in motions]
+        warped = [assignment.carry(H, way) for H, way in zip(state.H, ways, strict=True)]
+        hold = [COHERENCE / (1 + (deformation(way, before, after) / DEFORMED) ** 2)
+                for way, before, after in zip(ways, state.frame, frames, strict=True)]
+        done: list[np.ndarray] = []
+        for i, level in enumerate(self.levels):
+            H = warped[i]
+            if i > 0:  # what the coarser level changed, on top of what flowed here
+                H = H + _finer(done[-1] - warped[i - 1], H.shape[:2])
+            H = initialize.reseed(H, level.exemplar, frames[i])
+            done.append(level.optimize(H, frames[i], hold[i])[0])
+        return State(done, frames)
 
-    def visible(self, state: list[np.ndarray]) -> np.ndarray:
+    def visible(self, state: State) -> np.ndarray:
         """H (Y, X, 2) of a state, without its margin."""
-        return np.ascontiguousarray(state[-1][MARGIN:-MARGIN, MARGIN:-MARGIN])
+        return np.ascontiguousarray(state.H[-1][MARGIN:-MARGIN, MARGIN:-MARGIN])
 
     def _start(self, frame: np.ndarray) -> np.ndarray:
         """The coarsest level of the first frame: the best of several mosaics after optimization."""
@@ -140,7 +153,9 @@ class Synthesis:
         best, least = None, np.inf
         for start in range(STARTS):
             random = np.random.Generator(np.random.Philox(key=[self.seed, start]))
-            H, distance = level.optimize(initialize.mosaic(level.exemplar, frame, random), frame, 0.0)
+            H = level.optimize(initialize.mosaic(level.exemplar, frame, random), frame, free(frame))[0]
+            sown = initialize.reseed(H, level.exemplar, frame)
+            H, distance = level.optimize(sown, frame, free(frame))
             inside = H[MARGIN:-MARGIN, MARGIN:-MARGIN]
             # the distance alone would choose the emptiest
             score = distance + abs(np.sqrt(np.mean(inside**2)) / rms - 1)
@@ -148,6 +163,33 @@ class Synthesis:
                 best, least = H, score
         assert best is not None
         return best
+
+
+def free(frame: np.ndarray) -> np.ndarray:
+    """No hold to anything before: zeros (Y, X) float32 on the cells of a frame (Y, X, 2)."""
+    return np.zeros(frame.shape[:2], np.float32)
+
+
+def deformation(way: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """How far the flow bends the detail out of its local frame in one step: (Y, X) float32, 0 for a rigid one.
+
+    |R_after^T G R_before - 1| (Frobenius), G the gradient of the motion that ends in each cell; way (Y, X, 2) is
+    the displacement back to the departure point, before and after the local frames (Y, X, 2).
+    """
+    forward = -way
+    # G = 1 + grad(u), to first order in one frame's displacement u
+    dy, dx = np.gradient(forward, axis=(0, 1)) if min(way.shape[:2]) > 1 else (np.zeros_like(way),) * 2
+    old = assignment.carry(before, way)
+    old /= np.maximum(np.linalg.norm(old, axis=-1, keepdims=True), 1e-6)
+    # the columns of G R_before
+    axes = [np.stack([old[..., 0], old[..., 1]], -1), np.stack([-old[..., 1], old[..., 0]], -1)]
+    total = np.zeros(way.shape[:2], np.float32)
+    for i, axis in enumerate(axes):
+        moved = axis + axis[..., :1] * dx + axis[..., 1:] * dy
+        along = np.sum(after * moved, -1) - (i == 0)
+        across = after[..., 0] * moved[..., 1] - after[..., 1] * moved[..., 0] - (i == 1)
+        total += along**2 + across**2
+    return np.sqrt(total)
 
 
 def _finer(H: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

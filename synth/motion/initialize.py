@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 RELAXATIONS = 25
 # tiles laid per exemplar area: squares that turn do not pack without gaps, and some tiles die out
 CROWDING = 1.1
 NEAREST = 8
+EMPTY = 0.55
 
 
 def random_pixels(exemplar: np.ndarray, shape: tuple[int, int], random: np.random.Generator) -> np.ndarray:
@@ -36,6 +38,37 @@ def mosaic(exemplar: np.ndarray, frame: np.ndarray, random: np.random.Generator)
         nearest, offset = _owners(cells, centres, frame)
     at = np.rint(offset + (size - 1) / 2).astype(int) % size
     return exemplar[at[:, 1], at[:, 0]].reshape(rows, columns, 2)
+
+
+def reseed(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """H (Y, X, 2) with a whole exemplar laid into each place that has run empty.
+
+    A place is empty where the mean square of H over an exemplar's area is below EMPTY of the exemplar's own. A
+    flow that shears and stretches lets motifs die out; least squares alone never brings one back.
+    """
+    size = exemplar.shape[0]
+    spread = size / np.sqrt(2 * np.pi)  # a Gaussian of the exemplar's area
+    mean = float(np.mean(np.sum(exemplar.astype(np.float64) ** 2, axis=-1)))
+    H = H.copy()
+    rows, columns = H.shape[:2]
+    for _ in range(max(1, rows * columns // size**2)):
+        energy = ndimage.gaussian_filter(np.sum(H**2, axis=-1), spread, mode="reflect")
+        y, x = np.unravel_index(int(energy.argmin()), energy.shape)
+        if energy[y, x] >= EMPTY * mean:
+            break
+        reach = size - 1
+        window = np.mgrid[max(y - reach, 0):min(y + reach + 1, rows), max(x - reach, 0):min(x + reach + 1, columns)]
+        way_y, way_x = window[0] - y, window[1] - x
+        e = frame[y, x]
+        offset_x, offset_y = e[0] * way_x + e[1] * way_y, e[0] * way_y - e[1] * way_x
+        inside = np.maximum(np.abs(offset_x), np.abs(offset_y)) < size / 2
+        at_x, at_y = (np.rint(o + (size - 1) / 2).astype(int) % size for o in (offset_x, offset_y))
+        place = window[0][inside], window[1][inside]
+        tile = exemplar[at_y[inside], at_x[inside]]
+        # what stands at the edge of the place stays whole
+        stronger = np.sum(tile**2, axis=-1, keepdims=True) > np.sum(H[place] ** 2, axis=-1, keepdims=True)
+        H[place] = np.where(stronger, tile, H[place])
+    return H
 
 
 def _owners(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
