@@ -53,7 +53,7 @@ install_packages() {
     fi
 }
 
-command -v dpkg-query >/dev/null || stop "needs Debian 12 (or Ubuntu 24.04) with apt; the packages are in $PWD/pipeline/setup.sh"
+command -v dpkg-query >/dev/null || stop "needs Debian 12; elsewhere install what pipeline/setup.sh lists, then run: uv sync --locked"
 mapfile -t missing < <(missing_packages)
 if [ ${#missing[@]} != 0 ]; then
     if [ "$(id -u)" != 0 ] && ! sudo -n true 2>/dev/null; then
