@@ -32,6 +32,7 @@ app = App(
     version_flags=[],
     help_format="plaintext",  # markdown would load rich.markdown, a quarter of a second
     result_action="return_value",
+    suppress_keyboard_interrupt=False,
 )
 
 SceneFile = Annotated[Path, Parameter(help="The scene, a TOML file.")]

@@ -12,6 +12,7 @@ rename, and two that make the same file write the same bits.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -20,6 +21,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from pipeline.errors import StorageFailed
 from pipeline.files import atomic
 
 MANIFEST = "manifest.json"
@@ -51,12 +53,8 @@ class Folder:
 
     def __init__(self, path: Path):
         self.path = path
-        self.entries: dict[str, Entry] = {}
+        self.entries = _entries(path)
         self._verified: dict[str, tuple[int, int]] = {}
-        notes = path / NOTES
-        # the old manifest first: a note is newer
-        for file in [path / MANIFEST, notes / MANIFEST, *sorted(notes.glob("*.note"))]:
-            self.entries |= _read(file)
 
     def whole(self, name: str, key: str) -> Entry | None:
         """The entry of `name` if that file is whole and was made from `key`."""
@@ -79,19 +77,30 @@ class Folder:
 
     def add(self, name: str, key: str) -> Entry:
         """Note that `name`, just written, is whole."""
-        notes = self.path / NOTES
-        notes.mkdir(exist_ok=True)
-        if (self.path / MANIFEST).exists():
-            # from here on the folder is not what its manifest says; its entries still hold for the other files
-            os.replace(self.path / MANIFEST, notes / MANIFEST)
         file = self.path / name
         entry = Entry(key, file.stat().st_size, file_sha256(file))
-        atomic.write_text(notes / f"{name}.note", _json({name: entry}))
+        for attempts_left in (2, 1, 0):
+            try:
+                self._set_manifest_aside()
+                atomic.write_text(self.path / NOTES / f"{name}.note", _json({name: entry}))
+                break
+            except StorageFailed as error:
+                # another process has just closed the folder, and removed its notes under our hands
+                if not (attempts_left and isinstance(error.__cause__, FileNotFoundError)):
+                    raise
         self.entries[name] = entry
         return entry
 
+    def _set_manifest_aside(self) -> None:
+        """From here on the folder is not what its manifest says; its entries still hold for the other files."""
+        if (self.path / MANIFEST).exists():
+            (self.path / NOTES).mkdir(exist_ok=True)
+            with contextlib.suppress(FileNotFoundError):  # another process was faster
+                os.replace(self.path / MANIFEST, self.path / NOTES / MANIFEST)
+
     def close(self, keys: Mapping[str, str], about: Mapping[str, Any]) -> bool:
         """If every file of `keys` (name: key) is whole, write the manifest and tidy up; else return False."""
+        self.entries |= _entries(self.path)  # other processes may have made some of them
         found = {name: self.whole(name, key) for name, key in keys.items()}
         whole = {name: entry for name, entry in found.items() if entry}
         if len(whole) < len(keys):
@@ -110,10 +119,8 @@ class Folder:
         self._remove(self.entries)
         (self.path / MANIFEST).unlink(missing_ok=True)
         _remove_notes(self.path)
-        try:
+        with contextlib.suppress(OSError):  # the user keeps something of their own here
             self.path.rmdir()
-        except OSError:
-            pass  # the user keeps something of their own here
 
     def _remove(self, names: Iterable[str]) -> None:
         for name in names:
@@ -123,16 +130,26 @@ class Folder:
 def _remove_notes(path: Path) -> None:
     notes = path / NOTES
     for file in notes.glob("*") if notes.is_dir() else ():
-        file.unlink(missing_ok=True)
-    try:
+        if file.suffix != atomic.SUFFIX:
+            file.unlink(missing_ok=True)
+    atomic.sweep(notes)
+    with contextlib.suppress(OSError):  # not there, or another process is writing a note
         notes.rmdir()
-    except OSError:
-        pass  # not there, or another process is writing its own note
 
 
 def _json(entries: Mapping[str, Entry], about: Mapping[str, Any] | None = None) -> str:
     files = {name: asdict(entries[name]) for name in sorted(entries)}
     return json.dumps({**(about or {}), "files": files}, indent=1, ensure_ascii=False) + "\n"
+
+
+def _entries(path: Path) -> dict[str, Entry]:
+    """What the manifest of a folder and the notes of unfinished work say; a note is newer."""
+    found = _read(path / MANIFEST)
+    notes = path / NOTES
+    for file in [notes / MANIFEST, *sorted(notes.glob("*.note"))]:
+        found |= _read(file)
+    # once more: meanwhile another process may have turned the notes into a manifest
+    return _read(path / MANIFEST) | found
 
 
 def _read(file: Path) -> dict[str, Entry]:

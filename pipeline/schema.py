@@ -256,7 +256,7 @@ class Figure(Table):
         "below the panels, *italics* between asterisks; none: their usual ones", ())
     columns: int = key("panels in a row; 0: all", 0, ge=0, le=64)
     panel: int = key("width of a panel", 512, "pixels", ge=16, le=LARGEST)
-    frame: int = key("the frame the still shows; 0: the last", 0, ge=0)
+    frame: int = key("the frame the still shows; 0: the last", 0, ge=0, le=100000)
 
 
 class Scene(Table):

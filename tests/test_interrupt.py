@@ -1,0 +1,141 @@
+"""Ctrl-C, SIGTERM and kill -9 in every stage: nothing half-written, and the next run ends with the same bits."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from pipeline import stages
+from pipeline.progress import Progress
+from pipeline.scene import load
+
+SCENE = """\
+title = "A tiny circle"
+frames = 2
+[exemplar]
+kind = "circle"
+size = 8
+[coarse]
+kind = "analytic"
+flow = "rotation"
+size = [8, 8]
+[detail]
+size = [16, 16]
+iterations = 1
+neighborhoods = [5]
+[combine]
+omega = 1.5
+[density]
+m = 1
+scale = 1
+[render]
+kind = "lit"
+width = 32
+[figure]
+panels = ["coarse", "result"]
+panel = 32
+"""
+
+# runs the command line; the first time a file of this name is written and not yet renamed, it says so and waits
+HELD = """
+import pathlib, signal, sys, time
+from pipeline import cli
+from pipeline.files import atomic
+
+name, flag = sys.argv[1], pathlib.Path(sys.argv[2])
+sync = atomic._sync
+
+def held(path):
+    if name in path.name and path.name.endswith(atomic.SUFFIX):
+        flag.touch()
+        time.sleep(60)
+    sync(path)
+
+atomic._sync = held
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts background jobs with it ignored
+cli.main(sys.argv[3:])
+"""
+
+
+def contents(root: Path) -> dict[str, bytes]:
+    """Every file under `root`, by its path."""
+    return {file.relative_to(root).as_posix(): file.read_bytes() for file in sorted(root.rglob("*")) if file.is_file()}
+
+
+def run(folder: Path) -> dict[str, bytes]:
+    """What an uninterrupted run leaves in folder/out/tiny."""
+    (folder / "tiny.toml").write_text(SCENE)
+    stages.run("figure", load(folder / "tiny.toml"), folder / "out", Progress(quiet=True))
+    return contents(folder / "out" / "tiny")
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """What an uninterrupted run leaves."""
+    return run(tmp_path_factory.mktemp("reference"))
+
+
+def stopped(folder: Path, name: str, by: signal.Signals) -> subprocess.CompletedProcess[str]:
+    """`flowloom figure`, stopped while the file `name` is written and not yet in its place."""
+    (folder / "tiny.toml").write_text(SCENE)
+    flag = folder / "flag"
+    command = [sys.executable, "-P", "-c", HELD, name, str(flag), "figure", "tiny.toml"]
+    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 100
+    while not flag.exists() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(by)
+    out, err = process.communicate(timeout=50)
+    assert flag.exists(), err
+    return subprocess.CompletedProcess(command, process.returncode, out, err)
+
+
+@pytest.mark.parametrize(("name", "by", "code"), [
+    ("H.0002.exr", signal.SIGINT, 130),
+    ("density.0002.exr", signal.SIGINT, 130),
+    ("beauty.0001.exr", signal.SIGTERM, 143),
+    ("tiny.mp4", signal.SIGINT, 130),
+    ("manifest.json", signal.SIGTERM, 143),
+    ("L.0001.exr", signal.SIGKILL, -9),
+    ("H.0002.exr", signal.SIGKILL, -9),
+    ("H.0001.exr.note", signal.SIGKILL, -9),
+    ("density.0002.exr", signal.SIGKILL, -9),
+    ("beauty.0002.exr", signal.SIGKILL, -9),
+    ("tiny.png", signal.SIGKILL, -9),
+    ("manifest.json", signal.SIGKILL, -9),
+])
+def test_a_stopped_run_leaves_nothing_half_written_and_the_next_one_goes_on(
+        tmp_path: Path, reference: dict[str, bytes], name: str, by: signal.Signals, code: int) -> None:
+    ended = stopped(tmp_path, name, by)
+    assert ended.returncode == code
+    if code > 0:
+        assert ended.stderr.count("\n") == 1
+        assert "run the same command again" in ended.stderr
+    left = contents(tmp_path / "out" / "tiny")
+    hidden = {path for path in left if any(part.startswith(".") for part in Path(path).parts)}
+    for path in left.keys() - hidden:
+        assert left[path] == reference[path], f"{path} is not whole"
+    if code > 0:
+        assert not [path for path in hidden if path.endswith(".partial")]
+    assert run(tmp_path) == reference
+
+
+def test_two_runs_at_once_end_with_the_same_bits(tmp_path: Path, reference: dict[str, bytes]) -> None:
+    (tmp_path / "tiny.toml").write_text(SCENE)
+    command = [sys.executable, "-P", "-m", "pipeline.cli", "figure", "tiny.toml"]
+    processes = [subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    for process in processes:
+        _, err = process.communicate(timeout=200)
+        assert process.returncode == 0, err
+    assert contents(tmp_path / "out" / "tiny") == reference
+
+
+def test_the_farm_ends_with_the_same_bits_and_stops_its_processes(tmp_path: Path,
+                                                                  reference: dict[str, bytes]) -> None:
+    (tmp_path / "tiny.toml").write_text(SCENE)
+    command = [sys.executable, "-P", "-m", "pipeline.cli", "farm", "tiny.toml", "--workers", "2", "--batch", "1"]
+    subprocess.run(command, cwd=tmp_path, check=True, timeout=300)
+    assert contents(tmp_path / "out" / "tiny") == reference
