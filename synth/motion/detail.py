@@ -38,13 +38,14 @@ DEFORMED = 0.02
 @dataclass(frozen=True)
 class Settings:
     """levels of the pyramid, widths of the neighborhoods in their order, iterations with each, search "exact" or
-    "k-coherence" with k candidates a neighbour."""
+    "k-coherence" with k candidates a neighbour; the axis of the exemplar, "x" or "y", that lies along L."""
 
     levels: int
     neighborhoods: tuple[int, ...] = (17, 9)
     iterations: int = 4
     search: str = "exact"
     k: int = 4
+    along: str = "x"
 
 
 def enough_levels(size: int) -> int:
@@ -115,14 +116,14 @@ class Synthesis:
         if rms == 0.0:
             raise ValueError("the exemplar is zero everywhere")
         self.levels = [Level(I, rms, settings) for I in pyramid.pyramid(exemplar, settings.levels, toroidal=True)]
-        self.shape, self.seed = shape, seed
+        self.shape, self.seed, self.along = shape, seed, settings.along
 
     def frame(self, L: np.ndarray, state: State | None) -> State:
         """The state after the frame with coarse motion L (Y, X, 2) cells per frame; None before the first."""
         motions = [np.pad(motion / np.float32(2 ** (len(self.levels) - 1 - i)),
                           ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="edge")
                    for i, motion in enumerate(pyramid.pyramid(L, len(self.levels), toroidal=False))]
-        frames = [local_frame(motion) for motion in motions]
+        frames = [local_frame(motion, self.along) for motion in motions]
         if state is None:
             done = [self._start(frames[0])]
             for level, frame in zip(self.levels[1:], frames[1:], strict=True):

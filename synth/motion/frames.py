@@ -8,11 +8,14 @@ import numpy as np
 STILL = 1e-3
 
 
-def local_frame(L: np.ndarray) -> np.ndarray:
-    """The local x axis: unit vectors along L (Y, X, 2), as (Y, X, 2) float32; the y axis is 90 degrees on.
+def local_frame(L: np.ndarray, along: str = "x") -> np.ndarray:
+    """The local x axis of the exemplar in each cell of L (Y, X, 2): unit vectors (Y, X, 2) float32.
 
-    In 2D the frame is completely defined by L (§3.3). Where L rests it falls back on the x axis of the domain.
+    In 2D the frame is completely defined by L: the x axis follows it and the y axis stands 90 degrees on (§3.3).
+    With along = "y" the y axis follows it, so that upright motifs rise upright. Where L rests the frame falls back
+    on the axes of the domain.
     """
+    L = L if along == "x" else np.stack([L[..., 1], -L[..., 0]], axis=-1)
     rms = float(np.sqrt(np.mean(np.sum(L.astype(np.float64) ** 2, axis=-1))))
     if rms == 0.0:
         return np.broadcast_to(np.float32([1, 0]), L.shape).copy()
