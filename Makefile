@@ -72,5 +72,5 @@ lint: $(STAMP) ## ruff and mypy
 	.venv/bin/ruff check .
 	.venv/bin/mypy
 
-clean: ## remove what was made: out, build, .venv, caches
-	rm -rf out build .venv .cache .ruff_cache
+clean: ## remove what was made: pictures and fields (out), the environment, caches
+	rm -rf out build .venv .cache
