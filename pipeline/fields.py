@@ -89,6 +89,11 @@ def make_coarse(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
     wanted: Any = scene.coarse
     if wanted.kind == "file":
         steady = foreign_field(wanted.file, "coarse.file")
+        (rows, columns), detail = steady.shape, scene.detail.size
+        if detail[0] * rows != detail[1] * columns:
+            raise BadInput(wanted.file, "coarse.file", f"{columns}×{rows} has not the shape of detail.size, "
+                                                       f"{detail[0]}×{detail[1]}")
+        steady = Field.centred(steady.values, 2)
         yield from ((frame, steady) for frame in frames)
         return
     columns, rows = wanted.size
@@ -106,7 +111,8 @@ def make_detail(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
     wanted = scene.detail
     columns, rows = wanted.size
     levels = detail.enough_levels(scene.exemplar.size) if wanted.levels == "auto" else wanted.levels
-    settings = detail.Settings(levels, wanted.neighborhoods, wanted.iterations, wanted.search, wanted.k)
+    settings = detail.Settings(levels, wanted.neighborhoods, wanted.iterations, wanted.search, wanted.k,
+                               wanted.along)
     synthesis = detail.Synthesis(stock.read("exemplar").values, (rows, columns), settings, scene.seed)
     done, state = _kept(stock, frames[0])
     for frame in range(done + 1, frames[-1] + 1):

@@ -24,7 +24,8 @@ def transformed(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
     """H' (Y, X, 2): H in the domain's coordinates (§3.1, CoordinateTransform)."""
     from synth.motion import frames as local
 
-    return local.to_world(stock.read("H", frame).values, local.local_frame(coarse_cells(scene, stock, frame)))
+    frames = local.local_frame(coarse_cells(scene, stock, frame), scene.detail.along)
+    return local.to_world(stock.read("H", frame).values, frames)
 
 
 def final_motion(scene: Scene, stock: Stock, frame: int) -> np.ndarray:

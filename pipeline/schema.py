@@ -159,6 +159,7 @@ class Detail(Table):
     iterations: int = key("of search and assignment with each width (§4: 3 to 5)", 4, ge=1, le=50)
     search: Literal["exact", "k-coherence"] = key("exact, or k-coherence (§3.7)", "exact")
     k: int = key("candidates of k-coherence", 4, ge=1, le=32)
+    along: Literal["x", "y"] = key("the exemplar's axis that follows L (§3.3); \"y\": upright motifs rise upright", "x")
 
 
 class Combine(Table):
