@@ -2,6 +2,10 @@
 sources."""
 
 import itertools
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -225,3 +229,29 @@ def test_refusals():
         window(np.zeros((4, 4), np.float32), F, SOURCES, 2)
     with pytest.raises(ValueError, match="NaN"):
         list(naive([F[0], F[1] * np.nan], SOURCES))
+
+
+# Repeatability: another process, one thread, cold kernel cache.
+
+SUM = """
+import hashlib
+from tests.test_density import SOURCES, flows
+from synth.motion.density import windowed
+digest = hashlib.sha256()
+for shape in ((20, 70), (7, 12, 9)):
+    for D in windowed(flows(shape, 9), flows(shape, 9, seed=1), SOURCES, 4, scale=1.5):
+        digest.update(D.tobytes())
+print(digest.hexdigest())
+"""
+
+
+def test_the_same_bits_with_one_thread_and_two_in_a_cold_and_a_warm_cache(tmp_path):
+    def digest(threads):
+        environment = {**os.environ, "POCL_MAX_PTHREAD_COUNT": str(threads), "POCL_CACHE_DIR": str(tmp_path),
+                       "XDG_CACHE_HOME": str(tmp_path)}
+        return subprocess.run([sys.executable, "-c", SUM], env=environment, check=True, text=True,
+                              capture_output=True, cwd=Path(__file__).parents[1]).stdout
+
+    first = digest(1)
+    assert len(first) == 65
+    assert [digest(1), digest(2)] == [first] * 2

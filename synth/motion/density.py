@@ -31,16 +31,14 @@ from synth.noise import gradient_noise
 
 @dataclass(frozen=True)
 class Source:
-    """Where smoke enters. Lengths in world units: the domain is 1 high, its floor at y = 0, centred on x
-    and z.
+    """Where smoke enters. World units: the domain is 1 high, its floor at y = 0, centred on x and z.
 
     kind           "ball" (a disc in 2-D) or "box"
     centre         (x, y) or (x, y, z); z = 0 if left out
-    radius         of the ball or half the box's edge: a number, or one per axis (an ellipse; z as x if left
-    out)
+    radius         of the ball or half the box's edge: a number, or one per axis (z as x if left out)
     softness       share of the radius over which the edge fades, 0 to 1 (at least a cell's width)
     level          density injected, 0 to 1
-    streaks        contrast of a seeded pattern across x and z, 0 (even) to 1: it draws streaks along the paths
+    streaks        contrast of a seeded pattern across x and z, 0 (even) to 1; it draws the paths
     streak_size    width of a streak
     streak_period  frames in which the streaks change
     period, duty   smoke enters during the share `duty` of every `period` frames (puffs); duty 1 is always
