@@ -33,6 +33,53 @@ def continued(exemplar: np.ndarray, border: int) -> np.ndarray:
     return np.pad(exemplar, ((border, border), (border, border), (0, 0)), mode="wrap")
 
 
+def catmull_rom(t: np.ndarray) -> np.ndarray:
+    """Weights (..., 4) of the cells at -1, 0, 1, 2 for a point at t in [0, 1); float32."""
+    t = np.asarray(t, np.float32)
+    weights = [((2 - t) * t - 1) * t, (3 * t - 5) * t * t + 2, ((4 - 3 * t) * t + 1) * t, (t - 1) * t * t]
+    return np.float32(0.5) * np.stack(weights, axis=-1)
+
+
+def sample_reference(field: np.ndarray, at: np.ndarray, toroidal: bool) -> np.ndarray:
+    """Specification of `sample`: Catmull-Rom of field (N, M, 2) at points (P, 2) as x, y; edges wrap or repeat."""
+    low = np.floor(at).astype(int)
+    weights = catmull_rom((at - low).astype(np.float32))
+    index = low[:, :, None] + np.arange(-1, 3)
+    size = np.array(field.shape[1::-1])[:, None]
+    index = index % size if toroidal else np.clip(index, 0, size - 1)
+    cells = field[index[:, 1, :, None], index[:, 0, None, :]]
+    return np.einsum("pj,pi,pjic->pc", weights[:, 1], weights[:, 0], cells).astype(np.float32)
+
+
+def average_reference(exemplar: np.ndarray, position: np.ndarray, weight: np.ndarray, axis: np.ndarray,
+                      grid: tuple[int, int], radius: int, spacing: int, prior: np.ndarray,
+                      coherence: np.ndarray) -> np.ndarray:
+    """Specification of `average`: each site lays its match down, then every cell divides; arguments as there."""
+    rows, columns = prior.shape[:2]
+    sums, totals = np.zeros(prior.shape), np.zeros(prior.shape[:2])
+    for s in range(len(position)):
+        site = np.array([s % grid[1], s // grid[1]]) * spacing + spacing // 2
+        way_x, way_y = np.arange(columns) - site[0], (np.arange(rows) - site[1])[:, None]
+        e = axis[s]
+        offset = np.stack([e[0] * way_x + e[1] * way_y, e[0] * way_y - e[1] * way_x], axis=-1)
+        covered = np.abs(offset).max(axis=-1) <= radius + 0.001
+        o = offset[covered].astype(np.float32)
+        g = weight[s] * np.exp(-falloff(radius) * (o**2).sum(axis=-1))
+        sums[covered] += g[:, None] * sample_reference(exemplar, position[s] + o, toroidal=True)
+        totals[covered] += g
+    mean = sums / np.where(totals > 0, totals, 1)[..., None]
+    held = (mean + coherence[..., None] * prior) / (1 + coherence[..., None])
+    return np.where(totals[..., None] > 0, held, prior).astype(np.float32)
+
+
+def carry_reference(field: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+    """Specification of `carry`; arguments as there."""
+    rows, columns = field.shape[:2]
+    cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1)
+    at = np.clip(cells.astype(np.float32) + displacement, 0, np.array([columns - 1, rows - 1], np.float32))
+    return sample_reference(field, at.reshape(-1, 2), toroidal=False).reshape(field.shape)
+
+
 def average(exemplar: np.ndarray, position: Any, weight: np.ndarray, axis: Any, grid: tuple[int, int], radius: int,
             spacing: int, prior: Any, coherence: Any) -> Any:
     """Least squares (Eq. 1), cell by cell: the minimum over x of sum_p w_p |x_p - z_p|^2 + O(x).

@@ -8,6 +8,7 @@ of the exemplar's own neighbourhoods, where its best match is searched (ma09 §3
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -74,17 +75,27 @@ class Space:
     def dims(self) -> int:
         return self.basis.shape[1]
 
+    @cached_property
+    def _program(self) -> Any:
+        return opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=self.radius, DIMS=self.dims)
+
+    @cached_property
+    def _mean_and_basis(self) -> tuple[Any, Any]:
+        return opencl.to_device(self.mean), opencl.to_device(self.basis)
+
+    def gather(self, field: np.ndarray, frame: np.ndarray, sites: np.ndarray) -> Any:
+        """Oriented neighbourhoods of field (Y, X, 2) at sites (S, 2): device array (S, C); as `gather_reference`."""
+        count, samples = len(sites), (2 * self.radius + 1) ** 2
+        patches = opencl.empty((count, 2 * samples))
+        self._program.gather((samples, count), None, opencl.to_device(field), opencl.to_device(frame),
+                             np.array(field.shape[1::-1], np.int32), opencl.to_device(sites), patches)
+        return patches
+
     def project(self, field: np.ndarray, frame: np.ndarray, sites: np.ndarray) -> Any:
         """Oriented neighbourhoods of field (Y, X, 2) at sites (S, 2), in this space: device array (S, D)."""
-        count, side = len(sites), 2 * self.radius + 1
-        program = opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=self.radius, DIMS=self.dims)
-        patches = opencl.empty((count, side * side * 2))
-        size = np.array([field.shape[1], field.shape[0]], np.int32)
-        program.gather((side * side, count), None, opencl.to_device(field), opencl.to_device(frame), size,
-                       opencl.to_device(sites), patches)
-        out = opencl.empty((count, self.dims))
-        program.project((self.dims // 16, -(-count // 4)), None, patches, opencl.to_device(self.mean),
-                        opencl.to_device(self.basis), np.int32(count), out)
+        patches, out = self.gather(field, frame, sites), opencl.empty((len(sites), self.dims))
+        self._program.project((self.dims // 16, -(-len(sites) // 4)), None, patches, *self._mean_and_basis,
+                              np.int32(len(sites)), out)
         return out
 
     def project_reference(self, patches: np.ndarray) -> np.ndarray:

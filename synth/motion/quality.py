@@ -129,7 +129,7 @@ def whole_motifs(H: np.ndarray, frame: np.ndarray, exemplar: np.ndarray) -> tupl
     reach = max(1, min(template.shape[:2]) // 16)
     padded = np.pad(np.linalg.norm(H, axis=-1) > strong, reach, mode="edge")
     support = ndimage.binary_closing(padded, iterations=reach)[reach:-reach, reach:-reach]
-    pieces, count = ndimage.label(support, np.ones((3, 3)))
+    pieces = ndimage.label(support, np.ones((3, 3)))[0]
     whole = total = 0
     for label, box in enumerate(ndimage.find_objects(pieces), start=1):
         cells = int((pieces[box] == label).sum())

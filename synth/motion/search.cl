@@ -1,6 +1,8 @@
 // Best matches in PCA space (ma09 §3.1 exact, §3.7 k-coherence).
 // -D DIMS   dimensions of the space, a multiple of 16
 // -D BLOCK  queries a work-item treats together
+// -D CANDIDATES  similar neighbourhoods each match suggests
+// -D DAMPING  of the sub-cell step, as a share of its matrix's trace
 
 #define HUGE_DISTANCE 3.0e38f
 
@@ -62,15 +64,19 @@ __kernel void exact(__global const float *points, __global const float *half_nor
     }
 }
 
+inline float sum16(float16 v) {
+    const float8 s8 = v.lo + v.hi;
+    const float4 s4 = s8.lo + s8.hi;
+    return (s4.x + s4.y) + (s4.z + s4.w);
+}
+
 inline float squared_distance(__global const float *a, __global const float *b) {
     float16 sum = (float16)(0.0f);
     for (int d = 0; d < DIMS; d += 16) {
         const float16 difference = vload16(0, a + d) - vload16(0, b + d);
         sum = fma(difference, difference, sum);
     }
-    const float8 s8 = sum.lo + sum.hi;
-    const float4 s4 = s8.lo + s8.hi;
-    return (s4.x + s4.y) + (s4.z + s4.w);
+    return sum16(sum);
 }
 
 inline int wrapped(int x, int y, int2 exemplar) {
@@ -111,19 +117,31 @@ __kernel void coherent(__global const float *points, __global const int *similar
     distance[s] = least;
 }
 
-// Sub-cell position of the match: along each axis the minimum of the parabola through three distances.
+// Sub-cell position of the match: one Gauss-Newton step on |q - p(x)|^2, the slopes of p from its four
+// neighbours. Unlike the parabola through three distances it leaves an exact match where it is.
 __kernel void refine(__global const float *points, int2 exemplar, __global const float *queries,
                      __global const int *best, __global float2 *position) {
     const int s = get_global_id(0), x = best[s] % exemplar.x, y = best[s] / exemplar.x;
-    __global const float *q = queries + s * DIMS;
-    const float here = squared_distance(q, points + best[s] * DIMS);
-    const float west = squared_distance(q, points + wrapped(x - 1, y, exemplar) * DIMS);
-    const float east = squared_distance(q, points + wrapped(x + 1, y, exemplar) * DIMS);
-    const float south = squared_distance(q, points + wrapped(x, y - 1, exemplar) * DIMS);
-    const float north = squared_distance(q, points + wrapped(x, y + 1, exemplar) * DIMS);
-    const float2 slope = (float2)(west - east, south - north);
-    const float2 bend = (float2)(west + east, south + north) - 2.0f * here;
-    float2 shift = (float2)(bend.x > 0.0f ? 0.5f * slope.x / bend.x : 0.0f,
-                            bend.y > 0.0f ? 0.5f * slope.y / bend.y : 0.0f);
-    position[s] = (float2)(x, y) + clamp(shift, -0.5f, 0.5f);
+    __global const float *q = queries + s * DIMS, *p = points + best[s] * DIMS;
+    __global const float *west = points + wrapped(x - 1, y, exemplar) * DIMS;
+    __global const float *east = points + wrapped(x + 1, y, exemplar) * DIMS;
+    __global const float *south = points + wrapped(x, y - 1, exemplar) * DIMS;
+    __global const float *north = points + wrapped(x, y + 1, exemplar) * DIMS;
+    float16 xx = (float16)(0.0f), xy = xx, yy = xx, rx = xx, ry = xx;
+    for (int d = 0; d < DIMS; d += 16) {
+        const float16 left = vload16(0, q + d) - vload16(0, p + d);
+        const float16 dx = 0.5f * (vload16(0, east + d) - vload16(0, west + d));
+        const float16 dy = 0.5f * (vload16(0, north + d) - vload16(0, south + d));
+        xx = fma(dx, dx, xx);
+        xy = fma(dx, dy, xy);
+        yy = fma(dy, dy, yy);
+        rx = fma(left, dx, rx);
+        ry = fma(left, dy, ry);
+    }
+    const float trace = sum16(xx) + sum16(yy);
+    // along a stripe the match may slide: damping keeps it where it is
+    const float a = sum16(xx) + DAMPING * trace, b = sum16(xy), c = sum16(yy) + DAMPING * trace;
+    const float det = a * c - b * b;
+    const float2 shift = (float2)(c * sum16(rx) - b * sum16(ry), a * sum16(ry) - b * sum16(rx)) / det;
+    position[s] = (float2)(x, y) + (det > 0.0f ? clamp(shift, -0.5f, 0.5f) : (float2)(0.0f));
 }

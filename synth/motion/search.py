@@ -16,6 +16,8 @@ from synth import opencl
 from synth.motion.neighborhood import Space
 
 QUERIES_TOGETHER = 8
+# of the sub-cell step, as a share of its matrix's trace
+DAMPING = 1e-3
 
 
 def exact_reference(points: np.ndarray, queries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -48,6 +50,25 @@ def coherent_reference(points: np.ndarray, similar: np.ndarray, exemplar: tuple[
     return best, distance
 
 
+def refine_reference(points: np.ndarray, exemplar: tuple[int, int], queries: np.ndarray,
+                     best: np.ndarray) -> np.ndarray:
+    """Specification of `refine`; exemplar as (rows, columns), best (S,) indices -> (S, 2) float32 as x, y."""
+    rows, columns = exemplar
+    y, x = np.divmod(best, columns)
+
+    def at(i: int, j: int) -> np.ndarray:
+        return points[(y + j) % rows * columns + (x + i) % columns].astype(np.float64)
+
+    slopes = np.stack([at(1, 0) - at(-1, 0), at(0, 1) - at(0, -1)], axis=-1) / 2
+    matrix = slopes.transpose(0, 2, 1) @ slopes
+    matrix += DAMPING * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+    flat = np.linalg.det(matrix) == 0
+    matrix[flat] = np.eye(2)
+    toward = np.einsum("sd,sdi->si", queries - at(0, 0), slopes)
+    shift = np.linalg.solve(matrix, toward[..., None])[..., 0] * ~flat[:, None]
+    return (np.stack([x, y], axis=-1) + np.clip(shift, -0.5, 0.5)).astype(np.float32)
+
+
 @dataclass(frozen=True)
 class Matcher:
     """Searches the space of an exemplar of size `exemplar` (rows, columns) on the device."""
@@ -59,7 +80,7 @@ class Matcher:
     @cached_property
     def _program(self) -> Any:
         return opencl.program(Path(__file__).with_suffix(".cl"), DIMS=self.space.dims, BLOCK=QUERIES_TOGETHER,
-                              CANDIDATES=self.candidates)
+                              CANDIDATES=self.candidates, DAMPING=f"{DAMPING}f")
 
     @cached_property
     def _points(self) -> Any:
