@@ -44,7 +44,8 @@ def sweep(folder: Path) -> None:
     """Remove the temporaries of killed runs from `folder`; those of living processes stay."""
     for temporary in folder.glob(f".*{SUFFIX}"):
         if _is_abandoned(temporary):
-            temporary.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # another user's, in a shared folder
+                temporary.unlink()
 
 
 def _sync(path: Path) -> None:
