@@ -51,7 +51,7 @@ def _run(verb: str, scene: Path, quick: bool, out: Path, quiet: bool, frames: st
 
     scenes = load(scene, quick)
     last = max(s.frames for s in scenes.variants.values())
-    stages.run(verb, scenes, out, Progress(quiet), parsed(frames, last) if frames else None)
+    stages.run(verb, scenes, out, Progress(quiet), parsed(frames, last) if frames is not None else None)
 
 
 @app.command

@@ -43,7 +43,10 @@ def read_field(file: Path, scene: Scene) -> Field:
 
 def foreign_field(file: Path, key: str) -> Field:
     """A 2-D vector field of the user's: an EXR, or the middle slice of a VDB's grid `vel`."""
-    field = volumes.read_foreign(file, "vel") if file.suffix == ".vdb" else images.read_foreign_field(file, key)
+    try:
+        field = volumes.read_foreign(file, "vel") if file.suffix == ".vdb" else images.read_foreign_field(file, key)
+    except BadInput as error:
+        raise BadInput(file, key, error.reason) from error
     if not field.is_vector:
         raise BadInput(file, key, "holds no vector field")
     if field.dimension == 3:

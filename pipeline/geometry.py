@@ -6,7 +6,6 @@ alone, by any machine of a farm.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -43,34 +42,34 @@ def make_final(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[
         yield frame, Field.centred(final_motion(scene, stock, frame), 2).per_second(scene.fps)
 
 
-def _motions(scene: Scene, stock: Stock, frame: int) -> tuple[np.ndarray, np.ndarray]:
-    """L and F, each in cells per frame of its own grid: in the plane, or carried into a volume with depth."""
-    L, F = stock.read("L", frame).per_frame(scene.fps).values, final_motion(scene, stock, frame)
+def _placed(scene: Scene, density: np.ndarray) -> Field:
+    """A density of the plane, in the plane or with the body that [density.depth] gives it."""
     if scene.density.depth is None:
-        return L, F
-    from synth.motion.depth import deepen
+        return Field.centred(density, 2)
+    from synth.motion.depth import inflate
 
-    return deepen(L, F, scene.density.depth.layers, scene.density.depth.lean)
+    return Field.centred(inflate(density, scene.density.depth.reach), 3)
 
 
 def make_density(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
     """The density. A few frames of many are made one by one, which gives the same bits as all in a row."""
     wanted = scene.density
     last = frames[-1]
+    F = (final_motion(scene, stock, frame) for frame in range(1, last + 1))
     settings: dict[str, Any] = {"scale": wanted.scale, "border": wanted.border}
     if wanted.scheme == "naive":
-        every = _naive(scene, (_motions(scene, stock, frame)[1] for frame in range(1, last + 1)), settings)
+        every = _naive(scene, F, settings)
     elif len(frames) * wanted.m <= last:
         yield from _single_windows(scene, stock, frames, settings)
         return
     else:
         from synth.motion.density import windowed
 
-        both = itertools.tee(_motions(scene, stock, frame) for frame in range(1, last + 1))
-        every = windowed((L for L, _ in both[0]), (F for _, F in both[1]), _sources(scene), wanted.m, **settings)
+        L = (stock.read("L", frame).per_frame(scene.fps).values for frame in range(1, last + 1))
+        every = windowed(L, F, _sources(scene), wanted.m, **settings)
     for frame, values in enumerate(every, start=1):
         if frame in frames:
-            yield frame, Field.centred(values, values.ndim)
+            yield frame, _placed(scene, values)
 
 
 def _sources(scene: Scene) -> list[Any]:
@@ -98,26 +97,18 @@ def _single_windows(scene: Scene, stock: Stock, frames: list[int], settings: dic
     for frame in frames:
         if frame <= m:
             yield frame, _window(scene, stock, None, frame, settings)
-    coarse = (_coarse_alone(scene, stock, frame) for frame in range(1, max(ends, default=0) + 1))
+    coarse = (coarse_cells(scene, stock, frame) for frame in range(1, max(ends, default=0) + 1))
     for start, O in enumerate(_naive(scene, coarse, settings), start=1):
         if start in ends:
             yield ends[start], _window(scene, stock, O, ends[start], settings)
 
 
-def _coarse_alone(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
-    """L on the cells of F, in the plane or with depth."""
-    from synth.motion.coarse import upsample
-
-    L, F = _motions(scene, stock, frame)
-    return upsample(L, F.shape[:-1])
-
-
 def _window(scene: Scene, stock: Stock, O: np.ndarray | None, frame: int, settings: dict[str, Any]) -> Field:
     from synth.motion.density import window
 
-    motion = [_motions(scene, stock, i)[1] for i in range(max(frame - scene.density.m, 0) + 1, frame + 1)]
+    motion = [final_motion(scene, stock, i) for i in range(max(frame - scene.density.m, 0) + 1, frame + 1)]
     values = window(O, motion, _sources(scene), frame, **settings)
-    return Field.centred(values, values.ndim)
+    return _placed(scene, values)
 
 
 def _suffix(scene: Scene) -> str:

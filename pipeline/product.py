@@ -63,6 +63,10 @@ class Product:
         """The frames there are: 1 to scene.frames, or [0]."""
         return list(range(1, scene.frames + 1)) if self.animated else [0]
 
+    def reads_files(self, scene: Scene) -> bool:
+        """Whether its content depends on files that the scene names."""
+        return any(isinstance(getattr(_at(scene, key), "file", None), Path) for key in self.reads)
+
     def tables(self, scene: Scene) -> dict[str, Any]:
         """The values of `reads`, files by their content."""
         return {key: _plain(_at(scene, key)) for key in self.reads}

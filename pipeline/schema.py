@@ -190,10 +190,9 @@ class Source(Table):
 
 
 class Depth(Table):
-    """The plane motion carried into a volume: L revolved about the vertical axis, the detail laid through it."""
+    """Gives the smoke of the plane a body: each part is about as deep as it is wide."""
 
-    layers: int = key("cells of F's grid along z", 128, "cells", ge=4, le=LARGEST)
-    lean: float = key("shift of the detail along x per unit of depth; 0: straight through", 0.0, ge=-10, le=10)
+    reach: float = key("how deep the widest smoke reaches, to the front and to the back", 0.06, "heights", gt=0, le=0.5)
 
 
 class Density(Table):

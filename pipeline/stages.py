@@ -8,6 +8,7 @@ whole file, a changed ω re-bakes and does not re-synthesize, and variants share
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -127,10 +128,29 @@ class Works:
         Raises BadInput if a stage before it has not been run.
         """
         names = dict.fromkeys(p.name for ps in self.products.values() for p in ps.values() if p.stage == stage)
+        self._check_foreign_files(names)
         for name in names:
             for variant in self.makers(name):
                 self._make(variant, name, frames, progress)
         self._close(stage)
+
+    def _check_foreign_files(self, names: Iterable[str]) -> None:
+        """Read every file of the user's that is still needed, before anything is written."""
+        for name in names:
+            for variant in self.makers(name):
+                product, scene = self.products[variant][name], self.scenes.variants[variant]
+                missing = self.missing(variant, name, product.frames(scene)) if product.reads_files(scene) else []
+                if missing and not product.inputs:
+                    with self._blaming(product):
+                        next(product.make(scene, _Stock(self, variant, product), missing[:1]))
+
+    @contextmanager
+    def _blaming(self, product: Product) -> Iterator[None]:
+        """The methods raise ValueError for values that do not do; the schema cannot know all of those."""
+        try:
+            yield
+        except ValueError as error:
+            raise BadInput(self.scenes.file, product.reads[0], str(error)) from error
 
     def _make(self, variant: str, name: str, frames: Sequence[int] | None, progress: Progress) -> None:
         product, scene = self.products[variant][name], self.scenes.variants[variant]
@@ -145,15 +165,12 @@ class Works:
         folder = self.folder(variant, name)
         stock = _Stock(self, variant, product)
         with progress.task(label, len(wanted), len(wanted) - len(missing)) as advance:
-            try:
+            with self._blaming(product):
                 for frame, value in product.make(scene, stock, missing):
                     file = self.file(variant, name, frame)
                     product.write(file, value, scene)
                     folder.add(file.name, stock.key(frame))
                     advance()
-            except ValueError as error:
-                # the methods say so of values that no scene should hold; the schema cannot know them all
-                raise BadInput(self.scenes.file, product.reads[0], str(error)) from error
 
     def _close(self, stage: str) -> None:
         """Write the manifest of each folder of the stage that is whole, and drop folders of variants of the past."""
