@@ -104,8 +104,8 @@ def upsample(v: np.ndarray, shape: tuple[int, ...], kernel: str = "linear") -> n
     if kernel not in ("linear", "cubic"):
         raise ValueError(f"kernel {kernel!r} is neither linear nor cubic")
     ratio = [new / old for new, old in zip(shape, v.shape, strict=False)]
-    for axis, n in enumerate(shape):
-        v = _resample(v, axis, n, kernel)
+    for axis in reversed(range(len(shape))):  # x first: the last, largest pass then copies whole rows
+        v = _resample(v, axis, shape[axis], kernel)
     return v * np.array(ratio[::-1], np.float32)
 
 
@@ -123,8 +123,9 @@ def _resample(a: np.ndarray, axis: int, n: int, kernel: str) -> np.ndarray:
         weights = {-1: 0.5 * t * (-1 + t * (2 - t)), 0: 1 + 0.5 * t * t * (3 * t - 5),
                    1: 0.5 * t * (1 + t * (4 - 3 * t)), 2: 0.5 * t * t * (t - 1)}
     column = [-1 if i == axis else 1 for i in range(a.ndim)]
-    total = np.zeros((), np.float32)
+    total = np.zeros((*a.shape[:axis], n, *a.shape[axis + 1 :]), np.float32)
     for step, weight in weights.items():
         taken = np.take(a, np.clip(base + step, 0, old - 1), axis)
-        total = total + taken * weight.astype(np.float32).reshape(column)
+        taken *= weight.astype(np.float32).reshape(column)
+        total += taken
     return total
