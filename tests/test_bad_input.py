@@ -215,7 +215,7 @@ def test_a_volume_needs_no_llvm_so_an_old_one_does_no_harm(home: Path) -> None:
     for library in old:
         done = ended(["figure", "tiny.toml", "--out", library.name], env=os.environ | {
             "DRJIT_LIBLLVM_PATH": str(library), "XDG_CACHE_HOME": str(home)})
-        assert (done.returncode, done.stderr) == (0, "")
+        assert done.returncode == 0, done.stderr  # Dr.Jit itself tells of a library that it refuses
         assert (home / library.name / "tiny" / "images" / "beauty.0001.exr").is_file()
 
 
