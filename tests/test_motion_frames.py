@@ -86,3 +86,16 @@ def test_lengths_and_angles_are_kept():
 def test_the_frame_turned_back_undoes_it():
     H, frame = flow((9, 8), 1), local_frame(flow((9, 8), 3))
     np.testing.assert_allclose(to_world(to_world(H, frame), frame * np.float32([1, -1])), H, atol=1e-6)
+
+
+def test_with_the_y_axis_along_the_flow_what_is_upright_rises_with_it():
+    """A flow straight up leaves the exemplar as it is; any other turns it by as much as the flow is off that."""
+    np.testing.assert_array_equal(local_frame(np.full((2, 3, 2), (0, 1.5), np.float32), "y"),
+                                  local_frame(np.full((2, 3, 2), (1.5, 0), np.float32), "x"))
+    L = flow((6, 5))
+    x, y = local_frame(L, "x"), local_frame(L, "y")
+    strong = np.linalg.norm(L, axis=-1) > 0.3
+    np.testing.assert_allclose((y[..., 0] * x[..., 0] + y[..., 1] * x[..., 1])[strong], 0, atol=0.01)
+    np.testing.assert_allclose((y[..., 0] * x[..., 1] - y[..., 1] * x[..., 0])[strong], 1, atol=0.01)
+    np.testing.assert_array_equal(local_frame(np.zeros((2, 2, 2), np.float32), "y"),
+                                  np.full((2, 2, 2), (1, 0), np.float32))
