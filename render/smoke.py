@@ -23,7 +23,9 @@ from render import backend, denoise, lic, sheet, studio
 THICKNESS = 0.075  # about the size of one motif
 OPTICAL_DEPTH = 7.0  # through the whole sheet where density and relief are 1
 DENSITY_POWER = 1.3  # above 1: thin smoke is thinner than linear, and edges read finer
-BODY, DETAIL = 0.035, 0.012  # blur radii that tell the plume's body from its detail
+BODY = 0.035  # blur radius of the plume's body
+DETAIL = ((0.006, 0.2), (0.02, 0.3))  # of its detail, fine and coarse, and the relief each may add or take
+DETAIL_GAIN = 3.0  # of small differences of density
 KEY = sheet.Lamp(sheet.directions(125.0, 12.0, 3), slope=2.2, density=1.6)  # from the upper left, in front
 RIM = sheet.Lamp(sheet.directions(30.0, 12.0, 2), slope=1.2, density=0.8, behind=True)  # from the right
 KEY_LIGHT = np.array([1.00, 0.92, 0.82], np.float32) * 1.36  # warm
@@ -70,11 +72,12 @@ def _relief(rho: np.ndarray) -> np.ndarray:
     The body gives the plume its roundness; the detail turns the small differences of density inside it, which
     an opaque sheet would hide, into slopes that catch the light.
     """
-    height = rho.shape[0]
-    body = np.sqrt(np.clip(ndimage.gaussian_filter(rho, BODY * height, truncate=2.5), 0.0, 1.0))
-    detail = rho - ndimage.gaussian_filter(rho, DETAIL * height)
-    edge = np.sqrt(np.clip(rho / 0.25, 0.0, 1.0))
-    return np.clip(0.75 * body * edge + 0.25 * rho + 1.5 * detail, 0.0, 1.2)
+    def blurred(radius: float) -> np.ndarray:
+        return ndimage.gaussian_filter(rho, radius * rho.shape[0], truncate=2.5)
+
+    body = np.sqrt(np.clip(blurred(BODY), 0.0, 1.0)) * np.sqrt(np.clip(rho / 0.25, 0.0, 1.0))
+    detail = sum(most * np.tanh(DETAIL_GAIN / most * (rho - blurred(radius))) for radius, most in DETAIL)
+    return np.clip(0.66 * body + 0.12 * rho + detail, 0.0, 1.2).astype(np.float32)
 
 
 def _in_plane(rho: np.ndarray, towards: Iterable[tuple[float, float]], density: float,
