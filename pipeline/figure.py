@@ -6,7 +6,6 @@ that panel stands once for each variant; with several panels, each variant has a
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 

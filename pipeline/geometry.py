@@ -128,15 +128,19 @@ def read_density(file: Path, scene: Scene) -> Field:
     return read_field(file, scene) if scene.density.depth is None else volumes.read(file)["density"]
 
 
+TRANSFORM = ("synth.motion.combine", "synth.motion.frames", "synth.field")
+
+
 def products(scene: Scene) -> tuple[Product, ...]:
     """F; and the density, unless nothing renders it."""
     final = Product(
-        name="F", stage="bake", folder="geometry", suffix=exr, reads=("combine", "detail.size", "fps"),
-        inputs=(("L", "same"), ("H", "same")), methods=("synth.motion.combine", "synth.motion.frames", "synth.field"),
+        name="F", stage="bake", folder="geometry", suffix=exr, reads=("combine", "detail.size", "detail.along", "fps"),
+        inputs=(("L", "same"), ("H", "same")), methods=TRANSFORM,
         make=make_final, write=write_field, read=read_field)
     density = Product(
         name="density", stage="bake", folder="geometry", suffix=_suffix,
-        reads=("density", "combine", "detail.size", "seed", "fps"), inputs=(("L", "until"), ("H", "until")),
-        methods=("synth.motion.density", "synth.motion.depth", "synth.motion.combine", "synth.motion.frames", "synth.field"), make=make_density, write=write_density,
+        reads=("density", "combine", "detail.size", "detail.along", "seed", "fps"),
+        inputs=(("L", "until"), ("H", "until")),
+        methods=("synth.motion.density", "synth.motion.depth", *TRANSFORM), make=make_density, write=write_density,
         read=read_density)
     return (final,) if scene.render.kind == "none" else (final, density)

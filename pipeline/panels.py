@@ -136,8 +136,9 @@ def products(scene: Scene) -> tuple[Product, ...]:
             made.append(_picture(panel, make_input, ("exemplar", "figure.panel"), INPUTS["exemplar"], False))
         elif panel != "result":
             name, _, style = picture_of(panel).partition("-")
-            made.append(_picture(picture_of(panel), maker(name, style), ("figure.panel", "seed"), INPUTS[name],
-                                 name != "exemplar"))
+            transform = ("detail.size", "detail.along") if name == "detail" else ()
+            made.append(_picture(picture_of(panel), maker(name, style), ("figure.panel", "seed", *transform),
+                                 INPUTS[name], name != "exemplar"))
     return tuple(made)
 
 

@@ -202,7 +202,7 @@ def _reason(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
             return str(context["error"])
         case _:
             message = functools.reduce(lambda text, pair: text.replace(*pair), WORDS, fault["msg"])
-            shown = {dict: "a table", list: "an array"}.get(type(given)) or repr(given)
+            shown = {"dict": "a table", "list": "an array"}.get(type(given).__name__) or repr(given)
             return f"{message[0].lower()}{message[1:]}, not {shown}"
 
 

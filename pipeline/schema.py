@@ -60,6 +60,7 @@ def _several(value: object) -> object:
 
 Width = Annotated[int, Field(ge=3, le=33), AfterValidator(_odd)]
 Cells = Annotated[int, Field(ge=4, le=LARGEST)]
+Share = Annotated[float, Field(gt=0, le=1)]
 Cells2 = Annotated[tuple[Cells, Cells], Strict(False)]
 
 
@@ -102,6 +103,9 @@ class ClipExemplar(Table):
     kind: Literal["clip"] = key("a clip")
     file: Asset = key("a video")
     size: int = key("edge, to which its central square is resampled", 64, "cells", ge=8, le=1024)
+
+
+Exemplar = ProceduralExemplar | BitmapExemplar | DrawingExemplar | FieldExemplar | ClipExemplar
 
 
 class SmokeMotion(Table):
@@ -232,8 +236,8 @@ class VolumeRender(Table):
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
     denoised: bool = key("fit the paths to guides without noise", True)
     extinction: float = key("of smoke of density 1", 80.0, "per height", gt=0, le=10000)
-    bowl: Annotated[tuple[Annotated[float, Field(gt=0, le=1)], Annotated[float, Field(gt=0, le=1)]],
-                    Strict(False)] | None = key("radius and height of the bowl that the plume rises from", None, "heights")
+    bowl: Annotated[tuple[Share, Share], Strict(False)] | None = key(
+        "radius and height of the bowl that the plume rises from", None, "heights")
 
 
 class NoRender(Table):
@@ -267,7 +271,7 @@ class Scene(Table):
     seed: int = key("of every random choice", 1, ge=0, le=2**31 - 1)
     frames: int = key("length of the animation", 90, "frames", ge=1, le=100000)
     fps: float = key("speed of the animation", 30, "frames per second", gt=0, le=1000)
-    exemplar: ProceduralExemplar | BitmapExemplar | DrawingExemplar | FieldExemplar | ClipExemplar = Field(discriminator="kind")
+    exemplar: Exemplar = Field(discriminator="kind")
     coarse: SmokeMotion | NoiseMotion | AnalyticMotion | FileMotion = Field(discriminator="kind")
     detail: Detail = Detail()
     combine: Combine

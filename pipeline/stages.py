@@ -116,8 +116,8 @@ class Works:
         entry = self.entry(variant, name, frame)
         if not entry:
             product = self.products[variant][name]
-            file = product.file(self.scenes.variants[variant], frame)
-            raise BadInput(self.scenes.file, file, f"is not there yet: run flowloom {product.stage} on this scene first")
+            reason = f"is not there yet: run flowloom {product.stage} on this scene first"
+            raise BadInput(self.scenes.file, product.file(self.scenes.variants[variant], frame), reason)
         return entry
 
     # -- making -------------------------------------------------------------------------------------------------
@@ -164,13 +164,12 @@ class Works:
         label = f"{product.stage} {name}" + (f" ({variant})" if len(self.makers(name)) > 1 else "")
         folder = self.folder(variant, name)
         stock = _Stock(self, variant, product)
-        with progress.task(label, len(wanted), len(wanted) - len(missing)) as advance:
-            with self._blaming(product):
-                for frame, value in product.make(scene, stock, missing):
-                    file = self.file(variant, name, frame)
-                    product.write(file, value, scene)
-                    folder.add(file.name, stock.key(frame))
-                    advance()
+        with self._blaming(product), progress.task(label, len(wanted), len(wanted) - len(missing)) as advance:
+            for frame, value in product.make(scene, stock, missing):
+                file = self.file(variant, name, frame)
+                product.write(file, value, scene)
+                folder.add(file.name, stock.key(frame))
+                advance()
 
     def _close(self, stage: str) -> None:
         """Write the manifest of each folder of the stage that is whole, and drop folders of variants of the past."""

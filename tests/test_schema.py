@@ -17,6 +17,9 @@ README = schema.PROJECT_SCENES / "README.md"
 START, END = "<!-- tables: written by tests/test_schema.py -->", "<!-- end of tables -->"
 
 
+HEAD = ("| key | what | type and range | unit | default |", "|---|---|---|---|---|")
+
+
 def branches(annotation: object) -> list[type[BaseModel]]:
     """The tables among the types that `annotation` allows."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
@@ -100,8 +103,7 @@ def documentation() -> str:
     for path, model in tables():
         purpose = " ".join((model.__doc__ or "").split())
         rows = [row(name, field) for name, field in model.model_fields.items()]
-        parts.append("\n".join([heading(path, model), "", purpose, "", "| key | what | type and range | unit | default |",
-                                "|---|---|---|---|---|", *rows, ""]))
+        parts.append("\n".join([heading(path, model), "", purpose, "", *HEAD, *rows, ""]))
     return "\n".join(parts)
 
 

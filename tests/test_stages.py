@@ -222,7 +222,8 @@ def test_frames_baked_and_rendered_apart_are_the_same(tmp_path: Path, reference:
     made(tmp_path, verb="synth")
     for verb in ("bake", "render"):
         made(tmp_path, verb=verb, frames=[3])
-        assert not (tmp_path / "out" / "tiny" / {"bake": "geometry", "render": "images"}[verb] / "manifest.json").exists()
+        folder = tmp_path / "out" / "tiny" / {"bake": "geometry", "render": "images"}[verb]
+        assert not (folder / "manifest.json").exists()
         made(tmp_path, verb=verb, frames=[1])
         made(tmp_path, verb=verb, frames=[2, 3])
     assert bits(made(tmp_path)) == reference
@@ -282,5 +283,5 @@ def test_values_that_no_schema_can_know_are_bad_input(tmp_path: Path) -> None:
 
     pictures.write(tmp_path / "blank.png", np.zeros((32, 32)))
     text = SCENE.replace('kind = "circle"', 'kind = "bitmap"\nfile = "blank.png"')
-    with pytest.raises(BadInput, match="exemplar: .*blank"):
+    with pytest.raises(BadInput, match=r"exemplar: .*blank"):
         made(tmp_path, text)
