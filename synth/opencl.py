@@ -1,4 +1,4 @@
-"""The one home of pyopencl: device, build, launch. Kernels are written once and run on CPU (PoCL) and GPU alike.
+"""The one home of pyopencl: device, build, launch. A kernel is written once, for CPU (PoCL) and GPU alike.
 
 What it promises: the same source, defines and inputs give the same bits on one device, at any number of
 threads. So kernels gather and never scatter, use no float atomics, and are built without fast-math.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +64,8 @@ class Program:
         import pyopencl as cl
 
         options = [f"-D{name}={value}" for name, value in sorted(defines.items())]
-        options += ["-I", str(Path(__file__).parent), "-cl-std=CL1.2"]
-        self._program = cl.Program(_queue().context, source.read_text()).build(options)
+        options.append("-cl-std=CL1.2")
+        self._program = cl.Program(_queue().context, with_includes(source)).build(options)
         self._kernels: dict[str, Any] = {}
 
     def __getattr__(self, name: str) -> Any:
@@ -80,6 +81,18 @@ class Program:
                                                         for a in args))
 
         return launch
+
+
+def with_includes(source: Path) -> str:
+    """The text of `source`, with each #include "name" replaced by that file of synth/.
+
+    Not by the compiler: PoCL's breaks at a space in an include path, and its kernel cache need not notice that
+    an included file has changed.
+    """
+    def included(match: re.Match[str]) -> str:
+        return with_includes(Path(__file__).parent / match[1])
+
+    return re.sub(r'^#include "([^"]+)"$', included, source.read_text(), flags=re.MULTILINE)
 
 
 @functools.cache

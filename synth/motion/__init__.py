@@ -1,0 +1,23 @@
+"""Motion field texture synthesis (Ma, Wei, Guo, Zhou 2009: "ma09"), same dimension.
+
+In the order data passes through them:
+
+    exemplar      I, by procedure, from a bitmap, a drawing, a field, a clip (§4)
+    coarse        L, simulated, procedural or analytic; and its upsampling (§3, pseudocode 1)
+    frames        local frames of L, and the coordinate transformation of H (§3.1, §3.3)
+    initialize    the first frame (§3.4)
+    neighborhood  what is compared (§3.1, §3.3)
+    search        the best match of each neighbourhood (§3.1, §3.7)
+    assignment    least squares over the matches (§3.1)
+    detail        all of these, level by level and frame by frame (pseudocode 1 and 2)
+    quality       how good a synthesized field is
+    combine       F = upsample(L) + omega H' (§3.5), and its projection (§3.6)
+    density       the smoke that F carries, naive and windowed (supplement A, pseudocode 3 and 4)
+    depth         smoke of the plane with a body, as a volume
+
+Notation, as in the paper:
+
+    I  exemplar                L  coarse motion         H  detail, H' after the coordinate transformation
+    F  final motion            omega  weight of H'      D  density, O  density under L alone
+    m  window, in frames       x_p, z_p  output neighbourhood and its match      E_t  their energy
+"""
