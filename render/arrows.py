@@ -19,7 +19,7 @@ def drawn(picture: np.ndarray, tails: np.ndarray, vectors: np.ndarray, length: f
     """`picture` (h, w, 3) display values with an arrow for each vector, edges smooth, a light rim round it.
 
     tails: (N, 2) x, y in pixels from the lower left corner; vectors: (N, 2), y up; length: pixels of the longest
-    of them. A vector shorter than a tenth of the longest is drawn as a dot.
+    of them. A vector shorter than a tenth of the longest is left out.
     """
     result = picture.copy()
     longest = float(np.hypot(vectors[:, 0], vectors[:, 1]).max(initial=0.0))
@@ -27,6 +27,8 @@ def drawn(picture: np.ndarray, tails: np.ndarray, vectors: np.ndarray, length: f
         return result
     half = WIDTH * length / 2
     for tail, vector in zip(tails, vectors * (length / longest), strict=True):
+        if np.hypot(*vector) < 0.1 * length:
+            continue
         rim = _coverage(result.shape[:2], tail, vector, half, half * 0.9)
         ink = _coverage(result.shape[:2], tail, vector, half, 0.0)
         for (rows, columns, cover), paint in ((rim, (1.0, 1.0, 1.0)), (ink, colour)):
@@ -54,16 +56,13 @@ def _coverage(shape: Sequence[int], tail: np.ndarray, vector: np.ndarray, half: 
     x1, y1 = np.ceil(np.maximum(tail, tail + vector) + margin).astype(int)
     x0, x1 = np.clip([x0, x1], 0, shape[1])
     y0, y1 = np.clip([y0, y1], 0, shape[0])
-    y, x = np.meshgrid(np.arange(y1 - 1, y0 - 1, -1) + 0.5 - tail[1], np.arange(x0, x1) + 0.5 - tail[0], indexing="ij")
-    if reach < 6 * half:
-        distance = np.hypot(x, y) - 1.6 * half
-    else:
-        along, across = (x * vector[0] + y * vector[1]) / reach, np.abs(x * vector[1] - y * vector[0]) / reach
-        neck = max(reach * (1 - HEAD), reach - 7 * half)
-        shaft = np.maximum(across - half, np.maximum(-along, along - neck))
-        slope = 3 * half / (reach - neck)  # half width of the head per pixel of its length
-        side = (across - (reach - along) * slope) / np.hypot(1.0, slope)
-        head = np.maximum(side, neck - along)
-        distance = np.minimum(shaft, head)
+    y = (np.arange(y1 - 1, y0 - 1, -1) + 0.5 - tail[1])[:, None]
+    x = (np.arange(x0, x1) + 0.5 - tail[0])[None, :]
+    along, across = (x * vector[0] + y * vector[1]) / reach, np.abs(x * vector[1] - y * vector[0]) / reach
+    neck = max(reach * (1 - HEAD), reach - 7 * half)
+    shaft = np.maximum(across - half, np.maximum(-along, along - neck))
+    slope = 3 * half / (reach - neck)  # half width of the head per pixel of its length
+    head = np.maximum((across - (reach - along) * slope) / np.hypot(1.0, slope), neck - along)
+    distance = np.minimum(shaft, head)
     cover = np.clip(0.5 - (distance - grown), 0.0, 1.0).astype(np.float32)
     return slice(shape[0] - y1, shape[0] - y0), slice(x0, x1), cover
