@@ -8,32 +8,38 @@
 
 // Brute force: sixteen exemplar points to a vector lane, BLOCK queries to a work-item, so that every load of
 // the exemplar serves BLOCK fused multiply-adds. With half = |e|^2 / 2, |q - e|^2 = |q|^2 + 2 (half - q.e).
-// points (DIMS, padded) transposed; half (padded), huge in the padding; queries (count, DIMS)
-__kernel void exact(__global const float *points, __global const float *half_norm, int padded,
+// The loops over BLOCK are unrolled, or the compiler keeps the sums in memory.
+// points (blocks, DIMS, 32): 32 points side by side; half (blocks, 32), huge in the padding; queries (count, DIMS)
+__kernel void exact(__global const float *points, __global const float *half_norm, int blocks,
                     __global const float *queries, int count, __global int *best, __global float *distance) {
     const int first = get_global_id(0) * BLOCK;
+    float q[DIMS][BLOCK];
+    for (int b = 0; b < BLOCK; b++)
+        for (int d = 0; d < DIMS; d++) q[d][b] = -queries[min(first + b, count - 1) * DIMS + d];
     float16 least[BLOCK];
     int16 where[BLOCK];
-    __global const float *q[BLOCK];
+#pragma unroll
     for (int b = 0; b < BLOCK; b++) {
         least[b] = (float16)(HUGE_DISTANCE);
         where[b] = (int16)(0);
-        q[b] = queries + min(first + b, count - 1) * DIMS;
     }
-    for (int e = 0; e < padded; e += 32) {
+    for (int e = 0; e < blocks * 32; e += 32) {
         float16 left[BLOCK], right[BLOCK];
+#pragma unroll
         for (int b = 0; b < BLOCK; b++) {
             left[b] = vload16(0, half_norm + e);
             right[b] = vload16(0, half_norm + e + 16);
         }
         for (int d = 0; d < DIMS; d++) {
-            const float16 x = vload16(0, points + d * padded + e);
-            const float16 y = vload16(0, points + d * padded + e + 16);
+            const float16 x = vload16(0, points + e * DIMS + d * 32);
+            const float16 y = vload16(0, points + e * DIMS + d * 32 + 16);
+#pragma unroll
             for (int b = 0; b < BLOCK; b++) {
-                left[b] = fma((float16)(-q[b][d]), x, left[b]);
-                right[b] = fma((float16)(-q[b][d]), y, right[b]);
+                left[b] = fma((float16)(q[d][b]), x, left[b]);
+                right[b] = fma((float16)(q[d][b]), y, right[b]);
             }
         }
+#pragma unroll
         for (int b = 0; b < BLOCK; b++) {
             int16 closer = left[b] < least[b];
             least[b] = select(least[b], left[b], closer);
@@ -43,7 +49,9 @@ __kernel void exact(__global const float *points, __global const float *half_nor
             where[b] = select(where[b], (int16)(e + 16), closer);
         }
     }
-    for (int b = 0; b < BLOCK && first + b < count; b++) {
+#pragma unroll
+    for (int b = 0; b < BLOCK; b++) {
+        if (first + b >= count) continue;
         float lanes[16];
         int starts[16];
         vstore16(least[b], 0, lanes);
@@ -58,7 +66,7 @@ __kernel void exact(__global const float *points, __global const float *half_nor
                 index = at;
             }
         }
-        for (int d = 0; d < DIMS; d++) norm = fma(q[b][d], q[b][d], norm);
+        for (int d = 0; d < DIMS; d++) norm = fma(q[d][b], q[d][b], norm);
         best[first + b] = index;
         distance[first + b] = max(0.0f, norm + 2.0f * value);
     }

@@ -15,7 +15,7 @@ import numpy as np
 from synth import opencl
 from synth.motion.neighborhood import Space
 
-QUERIES_TOGETHER = 8
+QUERIES_TOGETHER = 12
 # of the sub-cell step, as a share of its matrix's trace
 DAMPING = 1e-3
 
@@ -87,14 +87,16 @@ class Matcher:
         return opencl.to_device(self.space.points)
 
     @cached_property
-    def _transposed(self) -> tuple[Any, Any, np.int32]:
+    def _blocks(self) -> tuple[Any, Any, np.int32]:
+        """The points 32 side by side: (blocks, D, 32), half their squared norms (blocks, 32), how many blocks."""
         count = len(self.space.points)
-        padded = -(-count // 32) * 32
-        points = np.zeros((self.space.dims, padded), np.float32)
-        points[:, :count] = self.space.points.T
-        half = np.full(padded, 1e30, np.float32)
+        blocks = -(-count // 32)
+        points = np.zeros((blocks * 32, self.space.dims), np.float32)
+        points[:count] = self.space.points
+        half = np.full(blocks * 32, 1e30, np.float32)
         half[:count] = 0.5 * (self.space.points.astype(np.float64) ** 2).sum(1)
-        return opencl.to_device(points), opencl.to_device(half), np.int32(padded)
+        side_by_side = points.reshape(blocks, 32, -1).transpose(0, 2, 1)
+        return opencl.to_device(side_by_side), opencl.to_device(half), np.int32(blocks)
 
     @cached_property
     def _similar(self) -> Any:
@@ -108,9 +110,8 @@ class Matcher:
         """Nearest neighbourhoods to device queries (S, D): device (S,) int32 index, (S,) float32 squared distance."""
         count = queries.shape[0]
         best, distance = opencl.empty(count, np.int32), opencl.empty(count)
-        points, half, padded = self._transposed
-        self._program.exact((-(-count // QUERIES_TOGETHER),), (1,), points, half, padded, queries, np.int32(count),
-                            best, distance)
+        self._program.exact((-(-count // QUERIES_TOGETHER),), (1,), *self._blocks, queries, np.int32(count), best,
+                            distance)
         return best, distance
 
     def coherent(self, queries: Any, sites: Any, axis: Any, grid: tuple[int, int], match: Any) -> tuple[Any, Any]:
