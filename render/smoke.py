@@ -150,7 +150,7 @@ class VolumeSettings:
     height: int = 640
     spp: int = 64
     seed: int = 1
-    extinction: float = 80.0
+    extinction: float = 110.0
     bowl: tuple[float, float] | None = None
     camera: studio.Camera = studio.CAMERA
     denoised: bool = True

@@ -45,7 +45,7 @@ class Softbox:
 
 
 CAMERA = Camera()
-KEY = Softbox((-3.0, 2.6, 1.6), (0.0, 0.4, 0.0), (1.5, 1.5), (46.0, 41.0, 35.0), 1.0)  # warm, from the left
+KEY = Softbox((-3.3, 2.4, 0.9), (0.0, 0.4, 0.0), (1.5, 1.5), (44.0, 39.0, 33.0), 1.0)  # warm, raking
 RIM = Softbox((2.5, 2.0, -2.2), (0.0, 0.5, 0.0), (1.0, 1.8), (14.0, 18.0, 24.0), 1.0)  # cool, from behind
 SKY: Point = (0.055, 0.066, 0.085)  # radiance of the dim light from everywhere
 SKY_SHARE = 0.15
