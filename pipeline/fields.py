@@ -152,7 +152,7 @@ def _kept(stock: Stock, first: int) -> tuple[int, State | None]:
 
     lists: dict[str, list[np.ndarray]] = {field.name: [] for field in dataclasses.fields(State)}
     try:
-        with np.load(stock.work / STATE, allow_pickle=False) as kept:
+        with np.load(io.BytesIO((stock.work / STATE).read_bytes()), allow_pickle=False) as kept:
             frame = int(kept["frame"])
             if not 0 < frame < first or str(kept["key"]) != stock.key(frame):
                 return 0, None

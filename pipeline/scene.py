@@ -227,4 +227,8 @@ def _fault_between_tables(scene: Scene) -> tuple[str, str]:
         return "render.kind", f'"{scene.render.kind}" {need}'
     if scene.figure.frame > scene.frames:
         return "figure.frame", f"the animation has {scene.frames} frames"
+    if scene.figure.labels and len(scene.figure.labels) != len(scene.figure.panels):
+        return "figure.labels", f"{len(scene.figure.labels)} labels for {len(scene.figure.panels)} panels"
+    if "result" in scene.figure.panels and scene.render.kind == "none":
+        return "figure.panels", 'there is no "result" with render.kind = "none"'
     return "", ""

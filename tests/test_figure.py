@@ -1,0 +1,98 @@
+"""The figure: how panels are laid out, what they are called, which frame the still shows."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import figure, stages
+from pipeline.files import pictures
+from pipeline.progress import Progress
+from pipeline.scene import load
+from render import layout
+
+SCENE = """\
+title = "Layout"
+frames = 2
+[exemplar]
+kind = "circle"
+size = 8
+[coarse]
+kind = "analytic"
+size = [8, 8]
+[detail]
+size = [8, 8]
+iterations = 1
+neighborhoods = [5]
+[combine]
+omega = 0.0
+[render]
+kind = "none"
+[figure]
+panel = 16
+"""
+
+
+def works(folder: Path, panels: str, extra: str = "") -> stages.Works:
+    """The works of a scene that shows `panels`, run to the end."""
+    file = folder / "tiny.toml"
+    file.write_text(f"{SCENE}panels = {panels}\n{extra}")
+    stages.run("figure", load(file), folder / "out", Progress(quiet=True))
+    return stages.Works(load(file), folder / "out")
+
+
+@pytest.fixture
+def laid(monkeypatch: pytest.MonkeyPatch) -> list[list[list[layout.Panel]]]:
+    """The rows of each sheet that is laid out."""
+    sheets: list[list[list[layout.Panel]]] = []
+    whole = layout.figure
+
+    def noted(rows: list[list[layout.Panel]]) -> np.ndarray:
+        sheets.append(rows)
+        return whole(rows)
+
+    monkeypatch.setattr(layout, "figure", noted)
+    return sheets
+
+
+def labels(rows: list[list[layout.Panel]]) -> list[list[str]]:
+    """The labels of a sheet's panels."""
+    return [[panel.label for panel in row] for row in rows]
+
+
+def test_panels_stand_in_rows_of_so_many_columns(tmp_path: Path, laid: list) -> None:
+    works(tmp_path, '["exemplar", "coarse", "detail"]', "columns = 2\n")
+    assert labels(laid[0]) == [[figure.LABELS["exemplar"], figure.LABELS["coarse"]], [figure.LABELS["detail"]]]
+    assert all(panel.picture.shape[1] == 16 for row in laid[0] for panel in row)
+
+
+def test_labels_are_the_scenes_own_where_it_has_some(tmp_path: Path, laid: list) -> None:
+    works(tmp_path, '["exemplar", "coarse"]', 'labels = ["this", "*that*"]\n')
+    assert labels(laid[0]) == [["this", "*that*"]]
+
+
+TWO = '[variants.a]\n[variants."*b*"]\n"exemplar.kind" = "square"\n'
+
+
+def test_variants_of_one_panel_stand_side_by_side_under_their_names(tmp_path: Path, laid: list) -> None:
+    works(tmp_path, '["detail"]', TWO)
+    assert labels(laid[0]) == [["a", "*b*"]]
+
+
+def test_variants_of_several_panels_have_a_row_each(tmp_path: Path, laid: list) -> None:
+    works(tmp_path, '["exemplar", "detail"]', TWO)
+    assert labels(laid[0]) == [["a", figure.LABELS["detail"]], ["*b*", figure.LABELS["detail"]]]
+    assert not np.array_equal(laid[0][0][0].picture, laid[0][1][0].picture)
+
+
+def test_the_still_shows_its_frame_and_the_animation_all(tmp_path: Path, laid: list) -> None:
+    made = works(tmp_path, '["coarse-colour"]', "frame = 1\n")
+    assert len(laid) == 1 + 2
+    np.testing.assert_array_equal(np.rint(pictures.read(made.root / "tiny.png") * 255), figure.sheet(made, 1))
+
+
+def test_too_few_or_too_many_labels_are_refused(tmp_path: Path) -> None:
+    from pipeline.errors import BadInput
+
+    with pytest.raises(BadInput, match=r"figure.labels: 1 labels for 2 panels"):
+        works(tmp_path, '["exemplar", "coarse"]', 'labels = ["one"]\n')
