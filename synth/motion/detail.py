@@ -124,24 +124,29 @@ class Synthesis:
                           ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="edge")
                    for i, motion in enumerate(pyramid.pyramid(L, len(self.levels), toroidal=False))]
         frames = [local_frame(motion, self.along) for motion in motions]
-        if state is None:
-            done = [self._start(frames[0])]
-            for level, frame in zip(self.levels[1:], frames[1:], strict=True):
-                H = initialize.reseed(_finer(done[-1], frame.shape[:2]), level.exemplar, frame)
-                done.append(level.optimize(H, frame, free(frame))[0])
-            return State(done, frames)
+        return State(self._first(frames) if state is None else self._next(motions, frames, state), frames)
+
+    def _first(self, frames: list[np.ndarray]) -> list[np.ndarray]:
+        """H of each level of the first frame: the coarsest from a mosaic, each other from the one before."""
+        done = [self._start(frames[0])]
+        for level, frame in zip(self.levels[1:], frames[1:], strict=True):
+            H = initialize.reseed(_finer(done[-1], frame.shape[:2]), level.exemplar, frame)
+            done.append(level.optimize(H, frame, free(frame))[0])
+        return done
+
+    def _next(self, motions: list[np.ndarray], frames: list[np.ndarray], state: State) -> list[np.ndarray]:
+        """H of each level of a later frame: what flowed here, corrected, held the more the less it was deformed."""
         ways = [departure(motion) for motion in motions]
         warped = [assignment.carry(H, way) for H, way in zip(state.H, ways, strict=True)]
-        hold = [COHERENCE / (1 + (deformation(way, before, after) / DEFORMED) ** 2)
-                for way, before, after in zip(ways, state.frame, frames, strict=True)]
         done: list[np.ndarray] = []
         for i, level in enumerate(self.levels):
             H = warped[i]
             if i > 0:  # what the coarser level changed, on top of what flowed here
                 H = H + _finer(done[-1] - warped[i - 1], H.shape[:2])
             H = initialize.reseed(H, level.exemplar, frames[i])
-            done.append(level.optimize(H, frames[i], hold[i])[0])
-        return State(done, frames)
+            bent = deformation(ways[i], state.frame[i], frames[i]) / DEFORMED
+            done.append(level.optimize(H, frames[i], COHERENCE / (1 + bent**2))[0])
+        return done
 
     def visible(self, state: State) -> np.ndarray:
         """H (Y, X, 2) of a state, without its margin."""

@@ -6,6 +6,7 @@ import numpy as np
 
 # Below this share of the field's rms the direction of L is noise; the frame turns to the fallback smoothly.
 STILL = 1e-3
+X_AXIS = np.array([1, 0], np.float32)
 
 
 def local_frame(L: np.ndarray, along: str = "x") -> np.ndarray:
@@ -18,10 +19,10 @@ def local_frame(L: np.ndarray, along: str = "x") -> np.ndarray:
     L = L if along == "x" else np.stack([L[..., 1], -L[..., 0]], axis=-1)
     rms = float(np.sqrt(np.mean(np.sum(L.astype(np.float64) ** 2, axis=-1))))
     if rms == 0.0:
-        return np.broadcast_to(np.float32([1, 0]), L.shape).copy()
-    frame = L / rms + np.float32([STILL, 0])
+        return np.broadcast_to(X_AXIS, L.shape).copy()
+    frame = L / rms + np.float32(STILL) * X_AXIS
     length = np.linalg.norm(frame, axis=-1, keepdims=True)
-    return np.where(length > 1e-12, frame / np.maximum(length, 1e-12), np.float32([1, 0])).astype(np.float32)
+    return np.where(length > 1e-12, frame / np.maximum(length, 1e-12), X_AXIS).astype(np.float32)
 
 
 def to_world(H: np.ndarray, frame: np.ndarray) -> np.ndarray:

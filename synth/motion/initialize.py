@@ -30,7 +30,7 @@ def mosaic(exemplar: np.ndarray, frame: np.ndarray, random: np.random.Generator)
     rows, columns = frame.shape[:2]
     cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(np.float32)
     count = max(1, round(CROWDING * rows * columns / size**2))
-    centres = random.random((count, 2), dtype=np.float32) * np.float32([columns - 1, rows - 1])
+    centres = random.random((count, 2), dtype=np.float32) * np.array([columns - 1, rows - 1], np.float32)
     # to find the middle of a tile, 8 x 8 of its cells are enough
     stride = max(1, size // 8)
     some = cells.reshape(rows, columns, 2)[::stride, ::stride].reshape(-1, 2)
