@@ -18,6 +18,7 @@ from render import film
 
 FRAME = 0.45  # display grey of the thin frame round a panel
 INK = 0.10  # display grey of the lettering
+LEGIBLE = 12  # pixels: letters get no smaller
 LATIN = "àâäçéèêëïîôöùûüÀÄÇÉÈÖÜß×÷±²³°·–—‘’“”…"  # what Droid Serif has beyond ASCII, as far as labels need it
 
 
@@ -97,7 +98,7 @@ def lettering(text: str, size: int) -> np.ndarray:
     All lines of one size have the same height and the same base line.
     """
     drawn = [np.zeros((_line_height(size), 0), np.float32)]
-    for number, piece in enumerate(text.split("*")):
+    for number, piece in enumerate(text.replace("′", "'").split("*")):  # a slanted ' is a prime
         italic = number % 2 == 1
         for latin, run in itertools.groupby(piece, lambda c: c.isascii() or c in LATIN):
             words = "".join(run)
@@ -132,16 +133,24 @@ def _leaning(upright: np.ndarray, size: int) -> np.ndarray:
                      for s, line in zip(shifts, upright, strict=True)]).astype(np.float32)
 
 
-def figure(rows: Sequence[Sequence[Panel]], *, letter: int = 26, gap: int = 20,
+def figure(rows: Sequence[Sequence[Panel]], *, letter: int | None = None, gap: int = 20,
            margin: int = 28) -> np.ndarray:
     """Panels in rows (each its own widths) as one picture (h, w, 3) uint8 sRGB on white.
 
-    Panels keep their pixels; those of a row stand on one base line. letter, gap, margin: pixels.
+    Panels keep their pixels; those of a row stand on one base line, and rows of as many panels stand column
+    under column. gap, margin: pixels; letter: size of the labels, pixels: a twentieth of the widest panel if left out, and less
+    where a label would be wider than its panel.
     """
     if not rows or not all(rows):
         raise ValueError("a figure needs at least one panel in each row")
-    strips = [_row([_finished(panel) for panel in row], [panel.label for panel in row], letter, gap)
-              for row in rows]
+    panels = [panel for row in rows for panel in row]
+    widest = max(panel.picture.shape[1] for panel in panels)
+    size = letter or _fitting([(panel.label, panel.picture.shape[1]) for panel in panels], round(widest / 20))
+    strips = []
+    for row in rows:
+        alike = [other for other in rows if len(other) == len(row)]
+        columns = [max(panel.picture.shape[1] for panel in column) for column in zip(*alike, strict=True)]
+        strips.append(_row([_finished(panel) for panel in row], [panel.label for panel in row], columns, size, gap))
     width = max(strip.shape[1] for strip in strips)
     padded = [_centred(strip, width) for strip in strips]
     spaced = [padded[0]]
@@ -149,6 +158,13 @@ def figure(rows: Sequence[Sequence[Panel]], *, letter: int = 26, gap: int = 20,
         spaced += [np.ones((gap, width, 3), np.float32), strip]
     sheet = np.pad(np.concatenate(spaced), ((margin, margin), (margin, margin), (0, 0)), constant_values=1.0)
     return np.rint(sheet * 255.0).astype(np.uint8)
+
+
+def _fitting(labels: list[tuple[str, int]], size: int) -> int:
+    """The largest size up to `size`, but not below LEGIBLE, at which each label is no wider than its room."""
+    while size > LEGIBLE and any(lettering(label, size).shape[1] > room for label, room in labels):
+        size -= 1
+    return max(size, LEGIBLE)
 
 
 def _centred(strip: np.ndarray, width: int) -> np.ndarray:
@@ -187,14 +203,15 @@ def _framed(picture: np.ndarray) -> np.ndarray:
     return picture
 
 
-def _row(pictures: list[np.ndarray], labels: list[str], letter: int, gap: int) -> np.ndarray:
-    """One row of finished panels over their labels, (h, w, 3) display values."""
+def _row(pictures: list[np.ndarray], labels: list[str], widths: list[int], letter: int,
+         gap: int) -> np.ndarray:
+    """One row of finished panels over their labels, each in the middle of its column, (h, w, 3) display values."""
     height = max(len(picture) for picture in pictures)
     below = _line_height(letter) + round(0.45 * letter) if any(labels) else 0
     columns = []
-    for picture, label in zip(pictures, labels, strict=True):
+    for picture, label, width in zip(pictures, labels, widths, strict=False):
         text = lettering(label, letter)
-        wide = max(picture.shape[1], text.shape[1])
+        wide = max(width, text.shape[1])
         column = np.ones((height + below, wide, 3), np.float32)
         left = (wide - picture.shape[1]) // 2
         column[height - len(picture):height, left:left + picture.shape[1]] = picture

@@ -85,7 +85,7 @@ def lines(v: np.ndarray, width: int, seed: int = 1) -> np.ndarray:
 
     v = _checked(v)
     rows, columns = height_for(v.shape, width) * OVERSAMPLING, width * OVERSAMPLING
-    fine = resampled(v, rows, columns)
+    fine = resampled(v, rows, columns, order=3)
     noise = _noise(rows, columns, seed)
     length = int(STREAK * max(rows, columns)) // 4 * 2 + 1  # odd: as far forward as back; two passes
     kernel = np.hanning(length + 2)[1:-1].astype(np.float32)
@@ -127,7 +127,7 @@ def colour(v: np.ndarray, width: int) -> np.ndarray:
 
     Hue is the direction, as `wheel` shows; the larger the magnitude, the deeper the colour; zero is white.
     """
-    fine = resampled(_checked(v), height_for(v.shape, width), width)
+    fine = resampled(_checked(v), height_for(v.shape, width), width, order=3)
     strength = _strength(fine)
     angle = np.arctan2(fine[..., 1], fine[..., 0])
     return _hued(1.0 - 0.30 * strength, 0.19 * strength, angle)[::-1].copy()
@@ -141,7 +141,7 @@ def picture(v: np.ndarray, width: int, seed: int = 1, tint: bool = False) -> np.
     grey = lines(v, width, seed)
     if not tint:
         return np.repeat(grey[..., None], 3, axis=2)
-    fine = resampled(_checked(v), height_for(v.shape, width), width)[::-1]
+    fine = resampled(_checked(v), height_for(v.shape, width), width, order=3)[::-1]
     strength = _strength(fine)
     room = 1.0 - np.abs(2.0 * grey - 1.0) ** 2  # no chroma at black and white: it would be clipped
     return _hued(0.25 + 0.75 * grey, 0.15 * strength * room, np.arctan2(fine[..., 1], fine[..., 0]))

@@ -28,13 +28,29 @@ def test_margin_and_gap_are_white() -> None:
     assert sheet.shape == (60, 147, 3)
 
 
-def test_rows_are_centred_and_stand_on_one_base_line() -> None:
-    rows = [[Panel(tone(0, 20, 30)), Panel(tone(0))], [Panel(tone(0, 40, 20))]]
+def test_panels_stand_on_one_base_line_and_under_each_other() -> None:
+    """Columns 30 and 60 wide; the last row has one panel only and is centred."""
+    rows = [[Panel(tone(0, 20, 30)), Panel(tone(0))], [Panel(tone(0, 20, 20)), Panel(tone(0))], [Panel(tone(0))]]
     sheet = layout.figure(rows, margin=0, gap=10)
-    assert sheet.shape == (40 + 10 + 40, 30 + 10 + 60, 3)
+    assert sheet.shape == (40 + 10 + 40 + 10 + 40, 30 + 10 + 60, 3)
     assert (sheet[:20, :30] == 255).all()
     assert (sheet[22:38, 2:28] < 20).all()
-    assert (sheet[52:88, 42:58] < 20).all()
+    assert (sheet[72:88, 7:23] < 20).all() and (sheet[72:88, :5] == 255).all()
+    assert (sheet[52:88, 42:98] < 20).all()
+    assert (sheet[102:138, 22:78] < 20).all()
+
+
+def test_labels_shrink_until_they_fit_their_panel() -> None:
+    """A grid keeps its columns under each other, whatever the labels say."""
+    long = "a label that would be wider than it may be"
+    grid = [[Panel(tone(0, 100, 400), long), Panel(tone(0, 100, 400))]] * 2
+    assert layout.figure(grid, margin=0, gap=10).shape[1] == 810
+    assert layout._fitting([("L", 400), (long, 400)], 26) < layout._fitting([("L", 400)], 26) == 26
+    assert layout._fitting([(long, 10)], 26) == layout.LEGIBLE
+
+
+def test_a_prime_stands_close_to_its_letter() -> None:
+    assert layout.lettering("*H′*", 40).shape[1] < 1.35 * layout.lettering("*H*", 40).shape[1]
 
 
 def test_labels_are_dark_centred_and_below() -> None:
