@@ -138,8 +138,8 @@ def figure(rows: Sequence[Sequence[Panel]], *, letter: int | None = None, gap: i
     """Panels in rows (each its own widths) as one picture (h, w, 3) uint8 sRGB on white.
 
     Panels keep their pixels; those of a row stand on one base line, and rows of as many panels stand column
-    under column. gap, margin: pixels; letter: size of the labels, pixels: a twentieth of the widest panel if left out, and less
-    where a label would be wider than its panel.
+    under column. gap, margin: pixels; letter: size of the labels, pixels: a twentieth of the widest panel if
+    left out, and less where a label would be wider than its panel.
     """
     if not rows or not all(rows):
         raise ValueError("a figure needs at least one panel in each row")
