@@ -55,7 +55,7 @@ def make_density(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tupl
     """The density. A few frames of many are made one by one, which gives the same bits as all in a row."""
     wanted = scene.density
     last = frames[-1]
-    F = (final_motion(scene, stock, frame) for frame in range(1, last + 1))
+    F = (_carried(scene, stock, frame) for frame in range(1, last + 1))
     settings: dict[str, Any] = {"scale": wanted.scale, "border": wanted.border}
     if wanted.scheme == "naive":
         every = _naive(scene, F, settings)
@@ -83,7 +83,14 @@ def _sources(scene: Scene) -> list[Any]:
     return made
 
 
-def _naive(scene: Scene, motion: Iterator[np.ndarray], settings: dict[str, Any]) -> Iterator[np.ndarray]:
+def _carried(scene: Scene, stock: Stock, frame: int) -> Any:
+    """F of a frame, its detail riding on L."""
+    from synth.motion.density import Carried
+
+    return Carried(final_motion(scene, stock, frame), coarse_cells(scene, stock, frame))
+
+
+def _naive(scene: Scene, motion: Iterator[Any], settings: dict[str, Any]) -> Iterator[np.ndarray]:
     from synth.motion.density import naive
 
     return naive(motion, _sources(scene), **settings)
@@ -106,7 +113,7 @@ def _single_windows(scene: Scene, stock: Stock, frames: list[int], settings: dic
 def _window(scene: Scene, stock: Stock, O: np.ndarray | None, frame: int, settings: dict[str, Any]) -> Field:
     from synth.motion.density import window
 
-    motion = [final_motion(scene, stock, i) for i in range(max(frame - scene.density.m, 0) + 1, frame + 1)]
+    motion = [_carried(scene, stock, i) for i in range(max(frame - scene.density.m, 0) + 1, frame + 1)]
     values = window(O, motion, _sources(scene), frame, **settings)
     return _placed(scene, values)
 
