@@ -67,11 +67,18 @@ class Level:
         return [Matcher(neighborhood.space(self.exemplar, width // 2), self.exemplar.shape[:2], self.settings.k)
                 for width in self.settings.neighborhoods]
 
-    def optimize(self, H: np.ndarray, frame: np.ndarray, coherence: np.ndarray) -> tuple[np.ndarray, float]:
+    def optimize(self, H: np.ndarray, frame: np.ndarray,
+                 coherence: np.ndarray | None = None) -> tuple[np.ndarray, float]:
         """Search and assign, round after round; returns H (Y, X, 2) and the mean distance of its last matches.
 
-        `coherence` holds the result to H as it came (the frame before, warped): the O(x) of Eq. 1.
+        `coherence` (Y, X) holds the result to H as it came, the frame before, warped: the O(x) of Eq. 1. Such a
+        frame is nearly there when it begins, so half the iterations do.
         """
+        iterations = self.settings.iterations
+        if coherence is None:
+            coherence = np.zeros(frame.shape[:2], np.float32)
+        else:
+            iterations = (iterations + 1) // 2
         prior, hold = opencl.to_device(H), opencl.to_device(coherence)
         distance = np.zeros(1, np.float32)
         for matcher in self.matchers:
@@ -80,7 +87,7 @@ class Level:
             axis = opencl.to_device(frame[sites[:, 1], sites[:, 0]])
             length = matcher.space.mean.size
             match: Any = None
-            for _ in range(self.settings.iterations):
+            for _ in range(iterations):
                 queries = matcher.space.project(H, frame, sites)
                 match, squared = self._search(matcher, queries, sites, axis, grid, match)
                 distance = squared.get() / length
@@ -131,7 +138,7 @@ class Synthesis:
         done = [self._start(frames[0])]
         for level, frame in zip(self.levels[1:], frames[1:], strict=True):
             H = initialize.reseed(_finer(done[-1], frame.shape[:2]), level.exemplar, frame)
-            done.append(level.optimize(H, frame, free(frame))[0])
+            done.append(level.optimize(H, frame)[0])
         return done
 
     def _next(self, motions: list[np.ndarray], frames: list[np.ndarray], state: State) -> list[np.ndarray]:
@@ -159,9 +166,9 @@ class Synthesis:
         best, least = None, np.inf
         for start in range(STARTS):
             random = np.random.Generator(np.random.Philox(key=[self.seed, start]))
-            H = level.optimize(initialize.mosaic(level.exemplar, frame, random), frame, free(frame))[0]
+            H = level.optimize(initialize.mosaic(level.exemplar, frame, random), frame)[0]
             sown = initialize.reseed(H, level.exemplar, frame)
-            H, distance = level.optimize(sown, frame, free(frame))
+            H, distance = level.optimize(sown, frame)
             inside = H[MARGIN:-MARGIN, MARGIN:-MARGIN]
             # the distance alone would choose the emptiest
             score = distance + abs(np.sqrt(np.mean(inside**2)) / rms - 1)
@@ -169,11 +176,6 @@ class Synthesis:
                 best, least = H, score
         assert best is not None
         return best
-
-
-def free(frame: np.ndarray) -> np.ndarray:
-    """No hold to anything before: zeros (Y, X) float32 on the cells of a frame (Y, X, 2)."""
-    return np.zeros(frame.shape[:2], np.float32)
 
 
 def deformation(way: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
