@@ -6,16 +6,16 @@ import pytest
 from synth import opencl
 from synth.motion.assignment import (
     EDGE,
-    average,
+    Assigner,
     average_reference,
     carry,
     carry_reference,
     catmull_rom,
     falloff,
-    robust_weights,
+    robust_weights_reference,
     sample_reference,
 )
-from synth.motion.neighborhood import site_grid
+from synth.motion.neighborhood import site_grid, spacing
 
 SHAPES = [(5, 7), (2, 2), (1, 9), (9, 1), (1, 1), (21, 26)]
 
@@ -25,28 +25,37 @@ def field(shape, seed=0):
 
 
 def case(shape, radius, size, seed=0):
-    """Arguments of `average`, host side: random matches, weights, axes, prior and hold."""
+    """Arguments of `average_reference`: random matches, weights, axes, prior and hold."""
     rng = np.random.default_rng(seed)
-    sites, grid, spacing = site_grid(shape, 2 * radius + 1)
+    sites, grid = site_grid(shape, 2 * radius + 1)
     angle = rng.uniform(-np.pi, np.pi, len(sites))
     position = rng.uniform(-0.5, np.array(size[::-1]) - 0.5, (len(sites), 2)).astype(np.float32)
     return (field(size, seed + 1), position, rng.uniform(0.1, 1, len(sites)).astype(np.float32),
-            np.stack([np.cos(angle), np.sin(angle)], -1).astype(np.float32), grid, radius, spacing,
+            np.stack([np.cos(angle), np.sin(angle)], -1).astype(np.float32), grid, radius, spacing(2 * radius + 1),
             field(shape, seed + 2), rng.uniform(0, 3, shape).astype(np.float32))
 
 
-def averaged(exemplar, position, weight, axis, grid, radius, spacing, prior, coherence):
-    device = opencl.to_device
-    return average(exemplar, device(position), weight, device(axis), grid, radius, spacing, device(prior),
-                   device(coherence)).get()
+def averaged(exemplar, position, weight, axis, grid, radius, step, prior, coherence):
+    position, weight, axis, prior, coherence = map(opencl.to_device, (position, weight, axis, prior, coherence))
+    return Assigner(exemplar, radius, step).average(position, weight, axis, grid, prior, coherence).get()
 
 
-def test_robust_weights_are_one_for_an_exact_match_and_fall_with_distance():
-    weights = robust_weights(np.float32([0, 0.01, 0.1, 1, 10]), 0.5)
-    assert weights[0] == 1 and weights.dtype == np.float32
-    assert (np.diff(weights) < 0).all() and weights[-1] > 0
+@pytest.mark.parametrize("weights", [
+    robust_weights_reference,
+    lambda squared, *given: Assigner(field((4, 4)), 4, 2).weights(opencl.to_device(squared), *given).get(),
+], ids=["reference", "kernel"])
+def test_robust_weights_are_one_for_an_exact_match_and_fall_with_distance(weights):
+    found = weights(np.float32([0, 1, 10, 100, 1e5, 1e8]), 100, 0.5)
+    assert found[0] == 1 and found.dtype == np.float32
+    assert (np.diff(found) < 0).all() and found[-1] > 0
     # far matches weigh as d^(r-2), r = 0.8: a thousand times the squared distance, 10^(-0.6 * 3) the weight
-    assert weights[4] / robust_weights(np.float32([1e4]), 0.5)[0] == pytest.approx(10 ** (0.6 * 3), rel=1e-3)
+    assert found[5] / found[4] == pytest.approx(10 ** (-0.6 * 3), rel=1e-3)
+
+
+def test_robust_weights_equal_their_reference():
+    squared = np.random.default_rng(0).exponential(30, 77).astype(np.float32)
+    ours = Assigner(field((4, 4)), 4, 2).weights(opencl.to_device(squared), 162, 0.4).get()
+    np.testing.assert_allclose(ours, robust_weights_reference(squared, 162, 0.4), rtol=1e-6)
 
 
 def test_the_falloff_reaches_its_edge():
@@ -80,10 +89,10 @@ def test_matches_that_agree_reproduce_the_exemplar():
     """Every site's match continues its neighbours': the average is the exemplar, tiled."""
     I = field((8, 8))
     for axis, place in ((np.float32([1, 0]), lambda x, y: (x, y)), (np.float32([0, 1]), lambda x, y: (y, -x))):
-        sites, grid, spacing = site_grid((24, 24), 9)
+        sites, grid = site_grid((24, 24), 9)
         position = np.stack(place(sites[:, 0], sites[:, 1]), -1) % 8
         out = averaged(I, position.astype(np.float32), np.full(len(sites), 0.3, np.float32),
-                       np.broadcast_to(axis, sites.shape).copy(), grid, 4, spacing, field((24, 24)),
+                       np.broadcast_to(axis, sites.shape).copy(), grid, 4, spacing(9), field((24, 24)),
                        np.zeros((24, 24), np.float32))
         y, x = np.mgrid[:24, :24]
         at = place(x, y)

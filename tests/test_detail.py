@@ -21,7 +21,6 @@ from synth.motion.detail import (
     Synthesis,
     deformation,
     enough_levels,
-    free,
     synthesize,
 )
 from synth.motion.exemplar import KINDS, exemplar

@@ -5,7 +5,7 @@ import pytest
 
 from synth import opencl
 from synth.motion.exemplar import exemplar
-from synth.motion.neighborhood import Space, site_grid, space
+from synth.motion.neighborhood import Space, site_grid, space, spacing
 from synth.motion.search import (
     QUERIES_TOGETHER,
     Matcher,
@@ -88,7 +88,7 @@ def test_among_identical_neighbourhoods_each_set_still_begins_with_its_own():
 def oriented_case(shape, width, size, seed=0):
     """Sites on a grid, unit axes in all directions, queries and a last match."""
     rng = np.random.default_rng(seed)
-    sites, grid, _ = site_grid(shape, width)
+    sites, grid = site_grid(shape, width)
     angle = rng.uniform(-np.pi, np.pi, len(sites))
     axis = np.stack([np.cos(angle), np.sin(angle)], -1).astype(np.float32)
     match = rng.integers(size[0] * size[1], size=len(sites)).astype(np.int32)
@@ -115,7 +115,7 @@ def test_coherence_carries_a_neighbours_match_along_the_frame():
     size = (16, 16)
     points = cloud(256, 16)
     ours = matcher(points, size)
-    sites, grid, spacing = site_grid((40, 40), 9)
+    sites, grid = site_grid((40, 40), 9)
     # the frame points along y: a step of (dx, dy) in the output is one of (dy, -dx) in the exemplar
     axis = np.broadcast_to(np.float32([0, 1]), sites.shape).copy()
     right = ((3 - (sites[:, 0] - 1)) % 16 * 16 + (5 + sites[:, 1] - 1) % 16).astype(np.int32)
@@ -125,7 +125,7 @@ def test_coherence_carries_a_neighbours_match_along_the_frame():
         best, distance = ours.coherent(queries, opencl.to_device(sites), opencl.to_device(axis), grid,
                                        opencl.to_device(match))
         match = best.get()
-        reached = (sites <= 1 + round_ * spacing).all(axis=1)
+        reached = (sites <= 1 + round_ * spacing(9)).all(axis=1)
         np.testing.assert_array_equal(match[reached], right[reached])
         np.testing.assert_array_equal(distance.get()[reached], 0)
 
@@ -171,8 +171,8 @@ def test_a_neighbourhood_between_cells_is_found_between_them(shift):
     ours = Matcher(space(flow(0, 0), 4), (n, n), 1)
     tiled = np.tile(flow(*shift), (3, 3, 1))
     sites = np.stack(np.meshgrid(np.arange(n, 2 * n), np.arange(n, 2 * n)), -1).reshape(-1, 2).astype(np.int32)
-    frame = np.broadcast_to(np.float32([1, 0]), tiled.shape).copy()
-    queries = ours.space.project(tiled, frame, sites)
+    axis = np.broadcast_to(np.float32([1, 0]), sites.shape)
+    queries = ours.space.project(*map(opencl.to_device, (tiled, sites, axis)))
     position = ours.refine(queries, ours.exact(queries)[0]).get()
     off = (position - (sites - n) - np.float32(shift) + n / 2) % n - n / 2
     assert np.abs(off).max() < 0.1

@@ -5,30 +5,31 @@
 // -D FIRST    position of the first site
 // -D BORDER   cells by which the exemplar was continued toroidally on each side
 
-// Catmull-Rom: interpolates (exact at cells) and, unlike linear weights, does not blur between them
-inline float4 catmull_rom(float t) {
-    return 0.5f * (float4)(((2.0f - t) * t - 1.0f) * t, (3.0f * t - 5.0f) * t * t + 2.0f,
-                           ((4.0f - 3.0f * t) * t + 1.0f) * t, (t - 1.0f) * t * t);
+// Catmull-Rom: interpolates (exact at cells) and, unlike linear weights, does not blur between them. Four cells
+// of a row are one vector; a, b, c, d weigh the cells at -1, 0, 1, 2 along x and along y.
+inline float2 sample(__global const float2 *field, int pitch, float2 at) {
+    const float2 low = floor(at), t = at - low;
+    const float2 a = 0.5f * ((2.0f - t) * t - 1.0f) * t, b = 0.5f * ((3.0f * t - 5.0f) * t * t + 2.0f);
+    const float2 c = 0.5f * ((4.0f - 3.0f * t) * t + 1.0f) * t, d = 0.5f * (t - 1.0f) * t * t;
+    const int first = ((int)low.y - 1 + BORDER) * pitch + (int)low.x - 1 + BORDER;
+    __global const float *row = (__global const float *)(field + first);
+    const float8 sum = a.y * vload8(0, row) + b.y * vload8(0, row + 2 * pitch) + c.y * vload8(0, row + 4 * pitch) +
+                       d.y * vload8(0, row + 6 * pitch);
+    return a.x * sum.s01 + b.x * sum.s23 + c.x * sum.s45 + d.x * sum.s67;
 }
 
-inline float2 sample(__global const float2 *exemplar, int pitch, float2 at) {
-    const float2 low = floor(at);
-    const float4 wx = catmull_rom(at.x - low.x), wy = catmull_rom(at.y - low.y);
-    __global const float2 *e = exemplar + ((int)low.y - 1 + BORDER) * pitch + (int)low.x - 1 + BORDER;
-    float2 sum = wy.x * (wx.x * e[0] + wx.y * e[1] + wx.z * e[2] + wx.w * e[3]);
-    e += pitch;
-    sum += wy.y * (wx.x * e[0] + wx.y * e[1] + wx.z * e[2] + wx.w * e[3]);
-    e += pitch;
-    sum += wy.z * (wx.x * e[0] + wx.y * e[1] + wx.z * e[2] + wx.w * e[3]);
-    e += pitch;
-    return sum + wy.w * (wx.x * e[0] + wx.y * e[1] + wx.z * e[2] + wx.w * e[3]);
+// squared distances (S) of matches -> weights (S) of the robust error
+__kernel void robust(__global const float *squared, float scale, float exponent, __global float *weight) {
+    const int s = get_global_id(0);
+    weight[s] = pow(1.0f + scale * squared[s], exponent);
 }
 
 // exemplar continued by BORDER; position (S) where a site's match lies in it; weight (S); axis (S), the frame at
-// the sites; prior (Y, X): the frame before, warped.
-__kernel void average(__global const float2 *exemplar, int pitch, __global const float2 *position,
-                      __global const float *weight, __global const float2 *axis, int2 grid, float falloff,
-                      __global const float2 *prior, __global const float *coherence,
+// the sites; falloff: factors of a match's weight at 0, 1, 2... cells from its centre along one axis; prior
+// (Y, X): the frame before, warped.
+__kernel void average(__global const float2 *exemplar, int pitch, __global const float *falloff,
+                      __global const float2 *position, __global const float *weight, __global const float2 *axis,
+                      int2 grid, __global const float2 *prior, __global const float *coherence,
                       __global float2 *out) {
     const int x = get_global_id(0), y = get_global_id(1), width = get_global_size(0);
     const float reach = 1.41421357f * RADIUS;
@@ -38,17 +39,18 @@ __kernel void average(__global const float2 *exemplar, int pitch, __global const
     const int top = min(grid.y - 1, (int)floor((y + reach - FIRST) / SPACING));
     float2 sum = (float2)(0.0f);
     float total = 0.0f;
-    for (int gy = bottom; gy <= top; gy++)
+    for (int gy = bottom; gy <= top; gy++) {
+        const int way_y = y - (gy * SPACING + FIRST);
         for (int gx = left; gx <= right; gx++) {
-            const int s = gy * grid.x + gx;
-            const float2 way = (float2)(x - (gx * SPACING + FIRST), y - (gy * SPACING + FIRST));
+            const int way_x = x - (gx * SPACING + FIRST), s = gy * grid.x + gx;
             const float2 e = axis[s];
-            const float2 o = (float2)(e.x * way.x + e.y * way.y, e.x * way.y - e.y * way.x);
+            const float2 o = (float2)(e.x * way_x + e.y * way_y, e.x * way_y - e.y * way_x);
             if (max(fabs(o.x), fabs(o.y)) > RADIUS + 0.001f) continue;
-            const float g = exp(-falloff * dot(o, o));
-            sum += g * weight[s] * sample(exemplar, pitch, position[s] + o);
-            total += g * weight[s];
+            const float w = falloff[abs(way_x)] * falloff[abs(way_y)] * weight[s];
+            sum += w * sample(exemplar, pitch, position[s] + o);
+            total += w;
         }
+    }
     const float2 before = prior[y * width + x];
     const float hold = coherence[y * width + x];
     out[y * width + x] = total > 0.0f ? (sum / total + hold * before) / (1.0f + hold) : before;

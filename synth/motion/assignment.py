@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,20 +19,15 @@ EXACT = 0.05
 EDGE = 0.1
 
 
-def robust_weights(distance: np.ndarray, rms: float) -> np.ndarray:
-    """Weights in (0, 1] of matches with mean squared differences (S,) float32; one for an exact match."""
-    floor = np.float32((EXACT * rms) ** 2)
-    return (1 + distance / floor) ** np.float32(ROBUST / 2 - 1)
+def robust_weights_reference(squared: np.ndarray, length: int, rms: float) -> np.ndarray:
+    """Specification of `Assigner.weights`; arguments as there."""
+    floor = length * (EXACT * rms) ** 2
+    return ((1 + squared / floor) ** (ROBUST / 2 - 1)).astype(np.float32)
 
 
-def falloff(radius: int) -> np.float32:
+def falloff(radius: int) -> float:
     """g in exp(-g |o|^2), the weight of a match at offset o from its centre."""
-    return np.float32(-np.log(EDGE) / max(radius, 1) ** 2)
-
-
-def continued(exemplar: np.ndarray, border: int) -> np.ndarray:
-    """The exemplar (N, M, 2) continued toroidally by `border` cells on each side."""
-    return np.pad(exemplar, ((border, border), (border, border), (0, 0)), mode="wrap")
+    return -float(np.log(EDGE)) / max(radius, 1) ** 2
 
 
 def catmull_rom(t: np.ndarray) -> np.ndarray:
@@ -80,23 +77,57 @@ def carry_reference(field: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     return sample_reference(field, at.reshape(-1, 2), toroidal=False).reshape(field.shape)
 
 
-def average(exemplar: np.ndarray, position: Any, weight: np.ndarray, axis: Any, grid: tuple[int, int], radius: int,
-            spacing: int, prior: Any, coherence: Any) -> Any:
-    """Least squares (Eq. 1), cell by cell: the minimum over x of sum_p w_p |x_p - z_p|^2 + O(x).
+@dataclass(frozen=True)
+class Assigner:
+    """Lays matches in an exemplar (N, M, 2) with sites `spacing` apart over the output."""
 
-    O(x) = w |x - prior|^2 with w = coherence * (sum of w_p there), the frame coherence of [Kwatra 2005 §5].
-    exemplar (N, M, 2); position (S, 2), where the matches' centres lie in it; weight (S,) float32 host array;
-    axis (S, 2), the local x axis of each site; grid (rows, columns) of sites, `spacing` apart;
-    prior (Y, X, 2), coherence (Y, X). Device arrays in, device array (Y, X, 2) out.
-    """
-    border = radius + 3
-    program = opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=radius, SPACING=spacing, FIRST=spacing // 2,
-                             BORDER=border)
-    out = opencl.empty(prior.shape)
-    program.average(prior.shape[1::-1], None, opencl.to_device(continued(exemplar, border)),
-                    np.int32(exemplar.shape[1] + 2 * border), position, opencl.to_device(weight), axis,
-                    np.array(grid[::-1], np.int32), falloff(radius), prior, coherence, out)
-    return out
+    exemplar: np.ndarray
+    radius: int
+    spacing: int
+
+    @property
+    def _border(self) -> int:
+        return self.radius + 3
+
+    @cached_property
+    def _program(self) -> Any:
+        return opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=self.radius, SPACING=self.spacing,
+                              FIRST=self.spacing // 2, BORDER=self._border)
+
+    @cached_property
+    def _continued(self) -> tuple[Any, np.int32]:
+        """The exemplar continued toroidally on each side, and its width."""
+        border = (self._border, self._border)
+        padded = np.pad(self.exemplar, (border, border, (0, 0)), mode="wrap")
+        return opencl.to_device(padded), np.int32(padded.shape[1])
+
+    @cached_property
+    def _falloff(self) -> Any:
+        away = np.arange(int(np.sqrt(2) * self.radius) + 2)
+        return opencl.to_device(np.exp(-falloff(self.radius) * away**2).astype(np.float32))
+
+    def weights(self, squared: Any, length: int, rms: float) -> Any:
+        """Weights (S,) in (0, 1] of matches at squared distances (S,) over `length` numbers; one for an exact match.
+
+        rms is the exemplar's. Device array in, device array out.
+        """
+        weight = opencl.empty(squared.shape)
+        self._program.robust(squared.shape, None, squared, np.float32(1 / (length * (EXACT * rms) ** 2)),
+                             np.float32(ROBUST / 2 - 1), weight)
+        return weight
+
+    def average(self, position: Any, weight: Any, axis: Any, grid: tuple[int, int], prior: Any, coherence: Any) -> Any:
+        """Least squares (Eq. 1), cell by cell: the minimum over x of sum_p w_p |x_p - z_p|^2 + O(x).
+
+        O(x) = w |x - prior|^2 with w = coherence * (sum of w_p there), the frame coherence of [Kwatra 2005 §5].
+        position (S, 2), where the matches' centres lie in the exemplar; weight (S,); axis (S, 2), the local x axis
+        of each site; grid (rows, columns) of sites; prior (Y, X, 2), coherence (Y, X). Device arrays in, device
+        array (Y, X, 2) out.
+        """
+        out = opencl.empty(prior.shape)
+        self._program.average(prior.shape[1::-1], None, *self._continued, self._falloff, position, weight, axis,
+                              np.array(grid[::-1], np.int32), prior, coherence, out)
+        return out
 
 
 def carry(field: np.ndarray, displacement: np.ndarray) -> np.ndarray:

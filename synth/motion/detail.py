@@ -19,6 +19,7 @@ import numpy as np
 from synth import opencl, pyramid
 from synth.advect import departure
 from synth.motion import assignment, initialize, neighborhood
+from synth.motion.assignment import Assigner
 from synth.motion.frames import local_frame
 from synth.motion.search import Matcher
 
@@ -63,8 +64,10 @@ class Level:
     settings: Settings
 
     @cached_property
-    def matchers(self) -> list[Matcher]:
-        return [Matcher(neighborhood.space(self.exemplar, width // 2), self.exemplar.shape[:2], self.settings.k)
+    def steps(self) -> list[tuple[int, Matcher, Assigner]]:
+        """For each width of the neighbourhoods in order: what searches and what assigns."""
+        return [(width, Matcher(neighborhood.space(self.exemplar, width // 2), self.exemplar.shape[:2],
+                                self.settings.k), Assigner(self.exemplar, width // 2, neighborhood.spacing(width)))
                 for width in self.settings.neighborhoods]
 
     def optimize(self, H: np.ndarray, frame: np.ndarray,
@@ -79,29 +82,23 @@ class Level:
             coherence = np.zeros(frame.shape[:2], np.float32)
         else:
             iterations = (iterations + 1) // 2
-        prior, hold = opencl.to_device(H), opencl.to_device(coherence)
-        distance = np.zeros(1, np.float32)
-        for matcher in self.matchers:
-            radius = matcher.space.radius
-            sites, grid, spacing = neighborhood.site_grid(H.shape[:2], 2 * radius + 1)
-            axis = opencl.to_device(frame[sites[:, 1], sites[:, 0]])
-            length = matcher.space.mean.size
-            match: Any = None
+        x = prior = opencl.to_device(H)
+        hold = opencl.to_device(coherence)
+        for width, matcher, assigner in self.steps:
+            at, grid = neighborhood.site_grid(H.shape[:2], width)
+            sites, axis = opencl.to_device(at), opencl.to_device(frame[at[:, 1], at[:, 0]])
+            z: Any = None
             for _ in range(iterations):
-                queries = matcher.space.project(H, frame, sites)
-                match, squared = self._search(matcher, queries, sites, axis, grid, match)
-                distance = squared.get() / length
-                weights = assignment.robust_weights(distance, self.rms)
-                H = assignment.average(self.exemplar, matcher.refine(queries, match), weights, axis, grid, radius,
-                                       spacing, prior, hold).get()
-        return H, float(np.mean(np.sqrt(distance))) / self.rms
-
-    def _search(self, matcher: Matcher, queries: Any, sites: np.ndarray, axis: Any, grid: tuple[int, int],
-                match: Any) -> tuple[Any, Any]:
-        # k-coherence needs a match to begin with: the first round of each neighbourhood searches exactly
-        if self.settings.search == "exact" or match is None:
-            return matcher.exact(queries)
-        return matcher.coherent(queries, opencl.to_device(sites), axis, grid, match)
+                queries = matcher.space.project(x, sites, axis)
+                # k-coherence needs a match to begin with: the first round of each width searches exactly
+                if self.settings.search == "exact" or z is None:
+                    z, squared = matcher.exact(queries)
+                else:
+                    z, squared = matcher.coherent(queries, sites, axis, grid, z)
+                weights = assigner.weights(squared, matcher.space.length, self.rms)
+                x = assigner.average(matcher.refine(queries, z), weights, axis, grid, prior, hold)
+        distance = np.sqrt(squared.get() / matcher.space.length)
+        return x.get(), float(np.mean(distance)) / self.rms
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 // Oriented neighbourhoods of a 2-D field and their projection on a PCA basis (ma09 §3.1, §3.3).
 // -D RADIUS  half width r of the neighbourhood, (2r+1)^2 samples
 // -D DIMS    number of PCA dimensions kept, a multiple of 16
+// -D SITES   neighbourhoods a work-item projects together
 
 #define SIDE (2 * RADIUS + 1)
 #define LENGTH (2 * SIDE * SIDE)
@@ -15,29 +16,34 @@ inline float2 bilinear_clamped(__global const float2 *field, int2 size, float2 a
     return (1.0f - t.y) * a + t.y * b;
 }
 
-// field (Y, X) float2; frame (Y, X) float2, the local x axis; sites (S) int2 -> out (S, SIDE, SIDE) float2
-__kernel void gather(__global const float2 *field, __global const float2 *frame, int2 size,
-                     __global const int2 *sites, __global float2 *out) {
-    const int k = get_global_id(0), s = get_global_id(1);
-    const int2 p = sites[s];
-    const float2 e = frame[p.y * size.x + p.x];
-    const float i = k % SIDE - RADIUS, j = k / SIDE - RADIUS;
-    const float2 at = convert_float2(p) + (float2)(e.x * i - e.y * j, e.y * i + e.x * j);
-    out[s * SIDE * SIDE + k] = bilinear_clamped(field, size, at);
+// field (Y, X) float2; sites (S) int2; axis (S) float2, the local x axis there -> out (S, SIDE, SIDE) float2
+__kernel void gather(__global const float2 *field, int2 size, __global const int2 *sites,
+                     __global const float2 *axis, __global float2 *out) {
+    const int s = get_global_id(0);
+    const float2 centre = convert_float2(sites[s]), e = axis[s];
+    for (int j = -RADIUS; j <= RADIUS; j++)
+        for (int i = -RADIUS; i <= RADIUS; i++) {
+            const float2 at = centre + (float2)(e.x * i - e.y * j, e.y * i + e.x * j);
+            out[(s * SIDE + j + RADIUS) * SIDE + i + RADIUS] = bilinear_clamped(field, size, at);
+        }
 }
 
-// Four sites and sixteen dimensions at a time: out[s, d] = sum over c of (patches[s, c] - mean[c]) * basis[c, d]
-__kernel void project(__global const float *patches, __global const float *mean, __global const float *basis,
+// SITES sites and sixteen dimensions to a work-item: out[s, d] = sum over c of patches[s, c] * basis[c, d], less
+// what the mean neighbourhood gives. The loops over SITES are unrolled, or the compiler keeps the sums in memory.
+// patches (S, LENGTH), S a multiple of SITES; basis (LENGTH, DIMS); mean (DIMS) -> out (count, DIMS)
+__kernel void project(__global const float *patches, __global const float *basis, __global const float *mean,
                       int count, __global float *out) {
-    const int d = get_global_id(0) * 16, s = get_global_id(1) * 4;
-    float16 sum[4] = {(float16)(0.0f), (float16)(0.0f), (float16)(0.0f), (float16)(0.0f)};
+    const int d = get_global_id(0) * 16, s = get_global_id(1) * SITES;
+    patches += s * LENGTH;
+    float16 sum[SITES];
+#pragma unroll
+    for (int q = 0; q < SITES; q++) sum[q] = -vload16(0, mean + d);
     for (int c = 0; c < LENGTH; c++) {
         const float16 b = vload16(0, basis + c * DIMS + d);
-        for (int q = 0; q < 4; q++) {
-            const int row = min(s + q, count - 1);
-            sum[q] = fma((float16)(patches[row * LENGTH + c] - mean[c]), b, sum[q]);
-        }
+#pragma unroll
+        for (int q = 0; q < SITES; q++) sum[q] = fma((float16)(patches[q * LENGTH + c]), b, sum[q]);
     }
-    for (int q = 0; q < 4; q++)
+#pragma unroll
+    for (int q = 0; q < SITES; q++)
         if (s + q < count) vstore16(sum[q], 0, out + (s + q) * DIMS + d);
 }

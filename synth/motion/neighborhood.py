@@ -20,15 +20,20 @@ from synth import opencl
 
 VARIANCE_KEPT = 0.995
 MOST_DIMS = 64
+SITES_TOGETHER = 12
 
 
-def site_grid(shape: tuple[int, int], width: int) -> tuple[np.ndarray, tuple[int, int], int]:
-    """Centres of the neighbourhoods: ((S, 2) int32 as x, y; grid size (rows, columns); spacing in cells)."""
-    spacing = max(1, width // 4)
-    ys = np.arange(spacing // 2, shape[0], spacing)
-    xs = np.arange(spacing // 2, shape[1], spacing)
-    grid = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2).astype(np.int32)
-    return grid, (len(ys), len(xs)), spacing
+def spacing(width: int) -> int:
+    """Cells from one neighbourhood of a width to the next."""
+    return max(1, width // 4)
+
+
+def site_grid(shape: tuple[int, int], width: int) -> tuple[np.ndarray, tuple[int, int]]:
+    """Centres of the neighbourhoods: ((S, 2) int32 as x, y, row by row; grid size (rows, columns))."""
+    step = spacing(width)
+    ys = np.arange(step // 2, shape[0], step)
+    xs = np.arange(step // 2, shape[1], step)
+    return np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2).astype(np.int32), (len(ys), len(xs))
 
 
 def exemplar_patches(exemplar: np.ndarray, radius: int) -> np.ndarray:
@@ -39,14 +44,14 @@ def exemplar_patches(exemplar: np.ndarray, radius: int) -> np.ndarray:
     return np.ascontiguousarray(windows.transpose(0, 1, 3, 4, 2)).reshape(rows * columns, -1)
 
 
-def gather_reference(field: np.ndarray, frame: np.ndarray, sites: np.ndarray, radius: int) -> np.ndarray:
-    """Specification of the kernel `gather`: field sampled bilinearly, clamped, at site + R(frame) (i, j).
+def gather_reference(field: np.ndarray, sites: np.ndarray, axis: np.ndarray, radius: int) -> np.ndarray:
+    """Specification of the kernel `gather`: field sampled bilinearly, clamped, at site + R(axis) (i, j).
 
-    field, frame (Y, X, 2) float32; sites (S, 2) int32 as x, y -> (S, (2r+1)^2 * 2) float32.
+    field (Y, X, 2) float32; sites (S, 2) int32 as x, y; axis (S, 2) float32 -> (S, (2r+1)^2 * 2) float32.
     """
     span = np.arange(-radius, radius + 1, dtype=np.float32)
     j, i = np.meshgrid(span, span, indexing="ij")
-    e = frame[sites[:, 1], sites[:, 0]][:, :, None, None]
+    e = axis[:, :, None, None]
     x = np.clip(sites[:, 0, None, None] + e[:, 0] * i - e[:, 1] * j, 0, field.shape[1] - 1).astype(np.float32)
     y = np.clip(sites[:, 1, None, None] + e[:, 1] * i + e[:, 0] * j, 0, field.shape[0] - 1).astype(np.float32)
     x0 = np.minimum(x.astype(int), max(field.shape[1] - 2, 0))
@@ -75,27 +80,39 @@ class Space:
     def dims(self) -> int:
         return self.basis.shape[1]
 
+    @property
+    def length(self) -> int:
+        """C, the numbers in one neighbourhood."""
+        return self.basis.shape[0]
+
     @cached_property
     def _program(self) -> Any:
-        return opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=self.radius, DIMS=self.dims)
+        return opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=self.radius, DIMS=self.dims,
+                              SITES=SITES_TOGETHER)
 
     @cached_property
-    def _mean_and_basis(self) -> tuple[Any, Any]:
-        return opencl.to_device(self.mean), opencl.to_device(self.basis)
+    def _basis_and_mean(self) -> tuple[Any, Any]:
+        """The basis, and the mean neighbourhood projected on it."""
+        mean = self.mean.astype(np.float64) @ self.basis
+        return opencl.to_device(self.basis), opencl.to_device(mean.astype(np.float32))
 
-    def gather(self, field: np.ndarray, frame: np.ndarray, sites: np.ndarray) -> Any:
-        """Oriented neighbourhoods of field (Y, X, 2) at sites (S, 2): device array (S, C); as `gather_reference`."""
-        count, samples = len(sites), (2 * self.radius + 1) ** 2
-        patches = opencl.empty((count, 2 * samples))
-        self._program.gather((samples, count), None, opencl.to_device(field), opencl.to_device(frame),
-                             np.array(field.shape[1::-1], np.int32), opencl.to_device(sites), patches)
+    def gather(self, field: Any, sites: Any, axis: Any) -> Any:
+        """Oriented neighbourhoods of field (Y, X, 2) at sites (S, 2) int32, their x axes along axis (S, 2).
+
+        Device arrays in, device array (S, C) out, as `gather_reference`; rows are added to make them a multiple
+        of SITES_TOGETHER, and hold nothing of meaning.
+        """
+        count, samples = sites.shape[0], (2 * self.radius + 1) ** 2
+        patches = opencl.empty((-(-count // SITES_TOGETHER) * SITES_TOGETHER, 2 * samples))
+        self._program.gather((count,), (1,), field, np.array(field.shape[1::-1], np.int32), sites, axis, patches)
         return patches
 
-    def project(self, field: np.ndarray, frame: np.ndarray, sites: np.ndarray) -> Any:
-        """Oriented neighbourhoods of field (Y, X, 2) at sites (S, 2), in this space: device array (S, D)."""
-        patches, out = self.gather(field, frame, sites), opencl.empty((len(sites), self.dims))
-        self._program.project((self.dims // 16, -(-len(sites) // 4)), None, patches, *self._mean_and_basis,
-                              np.int32(len(sites)), out)
+    def project(self, field: Any, sites: Any, axis: Any) -> Any:
+        """The oriented neighbourhoods, as in `gather`, in this space: device array (S, D)."""
+        count = sites.shape[0]
+        patches, out = self.gather(field, sites, axis), opencl.empty((count, self.dims))
+        self._program.project((self.dims // 16, len(patches) // SITES_TOGETHER), (1, 1), patches,
+                              *self._basis_and_mean, np.int32(count), out)
         return out
 
     def project_reference(self, patches: np.ndarray) -> np.ndarray:

@@ -79,7 +79,8 @@ def measure(H: np.ndarray, frame: np.ndarray, exemplar: np.ndarray) -> Quality:
     sites = np.stack([xs, ys], axis=-1).reshape(-1, 2).astype(np.int32)
     ours = exemplar_patches(exemplar, RADIUS)
     whole = _whole_space(ours)
-    theirs = whole.project(H, frame, sites)
+    theirs = whole.project(opencl.to_device(H), opencl.to_device(sites),
+                           opencl.to_device(frame[sites[:, 1], sites[:, 0]]))
     best, forward = Matcher(whole, exemplar.shape[:2], 1).exact(theirs)
     _, backward = Matcher(_whole_space(theirs.get()[:, :ours.shape[1]]), H.shape[:2], 1).exact(
         opencl.to_device(whole.points))
