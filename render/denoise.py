@@ -17,7 +17,9 @@ from scipy import ndimage
 
 from render import studio
 
-SMOKE_WINDOW = 6.0  # standard deviation of the window where smoke is seen, pixels
+SMOKE_WINDOW = 6.0  # standard deviation of the window where smoke is seen, pixels, at WINDOW_SPP paths
+WINDOW_SPP = 8  # with more paths per pixel windows shrink: the picture tends to the path-traced one
+SMALLEST_WINDOW = 2.0
 FLOOR_WINDOW = 16.0  # where only the floor and its soft shadows are
 BOWL_WINDOW = 3.0  # on the empty stage near the bowl, whose own shadow no guide knows
 LAMPS = (studio.KEY, studio.RIM)
@@ -200,12 +202,13 @@ def _near(mask: np.ndarray, reach: float) -> np.ndarray:
     return ndimage.gaussian_filter((spread > 0.01).astype(np.float32), 0.5 * reach)[..., None]
 
 
-def denoised(noisy: np.ndarray, grid: Grid, camera: studio.Camera, stage: Stage) -> np.ndarray:
-    """`noisy` (h, w, 3), the path-traced picture of a grid on a stage, without its noise; (h, w, 3) float32.
+def denoised(noisy: np.ndarray, spp: int, grid: Grid, camera: studio.Camera, stage: Stage) -> np.ndarray:
+    """`noisy` (h, w, 3), a grid on a stage traced with `spp` paths per pixel, without its noise; float32.
 
     Small windows where smoke is seen, large ones on the floor, whose shadows are soft and its noise coarse.
     """
     known = guides(grid, camera, stage)
+    shrunk = (WINDOW_SPP / max(spp, WINDOW_SPP)) ** 0.25  # half as wide for a quarter of the variance
+    smoke = regressed(noisy, known, max(SMOKE_WINDOW * shrunk, SMALLEST_WINDOW))
     share = _near(1.0 - known[..., 0], 2 * SMOKE_WINDOW)
-    smoke = regressed(noisy, known, SMOKE_WINDOW)
-    return share * smoke + (1.0 - share) * regressed(noisy, known[..., 4:], FLOOR_WINDOW)
+    return share * smoke + (1.0 - share) * regressed(noisy, known[..., 4:], FLOOR_WINDOW * shrunk)

@@ -187,7 +187,7 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
     sigma = density[box] * np.float32(settings.extinction * voxel_size)
     corner = np.array(origin) + voxel_size * np.array([side.start for side in box[::-1]])
     stage = _empty_stage(dataclasses.replace(settings, spp=STAGE_SPP, seed=1))
-    return denoise.denoised(light, denoise.Grid(sigma, voxel_size, corner), settings.camera, stage)
+    return denoise.denoised(light, settings.spp, denoise.Grid(sigma, voxel_size, corner), settings.camera, stage)
 
 
 @functools.lru_cache(maxsize=2)
@@ -197,13 +197,15 @@ def _empty_stage(settings: VolumeSettings) -> denoise.Stage:
     scene = _studio(mi, settings.bowl)
     light = _photographed(mi, scene, settings)
     loaded = mi.load_dict({"type": "scene"} | scene)
-    position, rays = denoise.view_rays(settings.camera, settings.width, settings.height)
+    # four rays per pixel: the guides' edges are as smooth as the picture's
+    position, rays = denoise.view_rays(settings.camera, 2 * settings.width, 2 * settings.height)
     unit = rays.reshape(-1, 3) / np.linalg.norm(rays.reshape(-1, 3), axis=1, keepdims=True)
     start = mi.Point3f(list(position))
     met = [loaded.ray_intersect(mi.Ray3f(start, mi.Vector3f(list(ray)))) for ray in unit]
-    distance = np.minimum([m.t for m in met], FARTHEST).reshape(light.shape[:2])
+    distance = np.minimum([m.t for m in met], FARTHEST).reshape(rays.shape[:2])
     bowl = [list(m.sh_frame.n) if m.is_valid() and m.shape.id() == "bowl" else [0.0] * 3 for m in met]
-    return denoise.quiet_stage(light, distance, np.array(bowl).reshape(light.shape))
+    return denoise.quiet_stage(light, lic.averaged(distance, 2),
+                               lic.averaged(np.array(bowl).reshape(rays.shape), 2))
 
 
 def _photographed(mi: Any, scene: dict[str, Any], settings: VolumeSettings) -> np.ndarray:
