@@ -8,7 +8,7 @@ each cell comes from, and the gather interpolates there.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -67,6 +67,13 @@ def velocity_field(v: np.ndarray) -> np.ndarray:
     return v
 
 
+class Region(NamedTuple):
+    """A box of cells that a kernel runs over, in x, y, z order; along x in whole work-groups."""
+
+    first: tuple[int, int, int]
+    size: tuple[int, int, int]
+
+
 class Grid:
     """The advection kernels on cells of `shape`, (Y, X) or (Z, Y, X), with arrays that stay on the device."""
 
@@ -76,23 +83,28 @@ class Grid:
         self.shape, self.border = shape, border
         x, y, z = shape[-1], shape[-2], shape[0] if len(shape) == 3 else 1
         self.cells = tuple(np.int32(n) for n in (x, y, z))
-        self.work = (-(-x // ROW) * ROW, y, z)
+        self.whole = Region((0, 0, 0), (-(-x // ROW) * ROW, y, z))
 
     def _program(self, channels: int) -> opencl.Program:
         return opencl.program(Path(__file__).with_suffix(".cl"), DIMS=len(self.shape), CHANNELS=channels,
                               BORDER=BORDERS[self.border])
 
-    def departure(self, v: Any, dt: float = 1.0, out: Any = None) -> Any:
-        """Displacements (shape, D) of the velocities (shape, D), both on the device; into `out` if given."""
+    def departure(self, v: Any, dt: float = 1.0, out: Any = None, region: Region | None = None) -> Any:
+        """Displacements (shape, D) of the velocities (shape, D), both on the device; into `out` if given.
+
+        Only the cells of `region` are computed, if given; the others of `out` stay as they were.
+        """
         out = opencl.empty(v.shape) if out is None else out
-        self._program(1).departure(self.work, (ROW, 1, 1), v, out, np.float32(dt), *self.cells)
+        region = region or self.whole
+        self._program(1).departure(region.size, (ROW, 1, 1), v, out, np.float32(dt), *self.cells,
+                                   offset=region.first)
         return out
 
     def gather(self, q: Any, displacements: Any, out: Any = None) -> Any:
         """q (shape, 1, 2, 3, 4, 8 or 16 channels) at the departure points; into `out` if given."""
         out = opencl.empty(q.shape) if out is None else out
         channels = q.size // int(np.prod(self.shape))
-        self._program(channels).advect(self.work, (ROW, 1, 1), q, displacements, out, *self.cells)
+        self._program(channels).advect(self.whole.size, (ROW, 1, 1), q, displacements, out, *self.cells)
         return out
 
 

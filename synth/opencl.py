@@ -56,8 +56,8 @@ def description() -> str:
 class Program:
     """One built source file; its kernels are attributes: `program.name(global_size, local_size, *args)`.
 
-    Sizes are in x, y, z order as OpenCL counts them. Arguments are device arrays (`to_device`, `empty`),
-    or NumPy scalars of the kernel's exact type.
+    Sizes are in x, y, z order as OpenCL counts them; `offset=` is where the global ids begin. Arguments are
+    device arrays (`to_device`, `empty`), or NumPy scalars of the kernel's exact type.
     """
 
     def __init__(self, source: Path, defines: dict[str, Any]):
@@ -76,9 +76,10 @@ class Program:
             self._kernels[name] = getattr(self._program, name)
         kernel = self._kernels[name]
 
-        def launch(global_size: tuple[int, ...], local_size: tuple[int, ...] | None, *args: Any) -> None:
-            kernel(_queue(), global_size, local_size, *(getattr(a, "data", a) if not np.isscalar(a) else a
-                                                        for a in args))
+        def launch(global_size: tuple[int, ...], local_size: tuple[int, ...] | None, *args: Any,
+                   offset: tuple[int, ...] | None = None) -> None:
+            kernel(_queue(), global_size, local_size,
+                   *(getattr(a, "data", a) if not np.isscalar(a) else a for a in args), global_offset=offset)
 
         return launch
 

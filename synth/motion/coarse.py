@@ -103,6 +103,8 @@ def upsample(v: np.ndarray, shape: tuple[int, ...], kernel: str = "linear") -> n
         raise ValueError(f"a field of {v.ndim - 1} dimensions cannot fill {shape}")
     if kernel not in ("linear", "cubic"):
         raise ValueError(f"kernel {kernel!r} is neither linear nor cubic")
+    if v.shape[:-1] == tuple(shape):
+        return v
     ratio = [new / old for new, old in zip(shape, v.shape, strict=False)]
     for axis in reversed(range(len(shape))):  # x first: the last, largest pass then copies whole rows
         v = _resample(v, axis, shape[axis], kernel)

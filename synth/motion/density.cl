@@ -17,8 +17,27 @@ kernel void inject(global float *restrict q, global const float *restrict lowest
     STORE(fmin(above, (quantity)(highest[here])), cell, q);
 }
 
-// One step of every lane, out = q carried along d. Lane `take` is copied to `taken`, then lane `put` begins anew
-// from `fresh`; a negative lane is none.
+#if CHANNELS == 1
+#define ANY(condition) (condition)
+#else
+#define ANY(condition) any(condition)
+#endif
+
+// Of each row of cells (y, z): the first and the last x from `begin` to `end` - 1 with smoke in any lane; with
+// none, `end` and `begin` - 1. extents is (Z, Y, 2).
+kernel void extent(global const float *restrict q, global int *restrict extents, const int begin, const int end,
+                   const int X, const int Y)
+{
+    const int row = get_global_id(1) * Y + get_global_id(0);
+    int first = begin, last = end - 1;
+    while (first < end && !ANY(LOAD(row * X + first, q) != 0.0f)) first++;
+    while (last >= first && !ANY(LOAD(row * X + last, q) != 0.0f)) last--;
+    extents[2 * row] = first;
+    extents[2 * row + 1] = first < end ? last : begin - 1;
+}
+
+// One step of every lane, out = q carried along d, where smoke thinner than THINNEST is gone. Lane `take` is
+// copied to `taken`, then lane `put` begins anew from `fresh`; a negative lane is none.
 kernel void step_lanes(global const float *restrict q, global const float *restrict displacements,
                        global float *restrict out, global const float *restrict fresh,
                        global float *restrict taken, const int take, const int put, const int X, const int Y,
@@ -27,7 +46,8 @@ kernel void step_lanes(global const float *restrict q, global const float *restr
     const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
     if (x >= X) return;
     const int cell = (z * Y + y) * X + x;
-    STORE(at_departure(q, displacements, x, y, z, X, Y, Z), cell, out);
+    const quantity value = at_departure(q, displacements, x, y, z, X, Y, Z);
+    STORE(value * step((quantity)(THINNEST), value), cell, out);
     if (take >= 0) taken[cell] = out[cell * CHANNELS + take];
     if (put >= 0) out[cell * CHANNELS + put] = fresh[cell];
 }

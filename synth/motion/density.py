@@ -9,8 +9,8 @@ pattern stays crisp under the smoke that passes, and nothing depends on the fram
 
 Pseudocode 4 restarts each D_i and does m steps for it. Here the m windows that are under way advance side
 by side, one step per frame: the same numbers, bit for bit, with one departure map, no history of fields,
-and memory that does not grow with the frames. `window` is one frame alone, as the pseudocode writes it, for
-a farm.
+and memory that does not grow with the frames. Cells that no smoke can reach are left out. `window` is one
+frame alone, as the pseudocode writes it, for a farm.
 """
 
 from __future__ import annotations
@@ -23,14 +23,16 @@ from typing import Any
 import numpy as np
 
 from synth import opencl
-from synth.advect import BORDERS, ROW, Grid, velocity_field
+from synth.advect import BORDERS, ROW, Grid, Region, velocity_field
 from synth.field import domain_origin
 from synth.motion.coarse import upsample
 from synth.noise import gradient_noise
 
-
 SUBSTEPS = 4
 """Steps in which smoke is traced along the detail of a frame."""
+
+THINNEST = 1e-5
+"""Thinner smoke is gone: nobody can see it, and interpolation would spread it over the grid for ever."""
 
 
 @dataclass(frozen=True)
@@ -146,17 +148,17 @@ def naive(F_frames: Iterable[Motion], sources: Sequence[Source], *, scale: float
     F_frames  F_1, F_2, … (Y, X, 2) or (Z, Y, X, 3) float32, cells per frame, or Carried
     sources   what enters, one after the other
     scale     cells of the density grid per cell of the field, along each axis; F is then interpolated
-    smoothly
-              (Catmull and Rom)
+              smoothly (Catmull and Rom)
     border    beyond the grid "zero" (no smoke comes in), "clamp" or "toroidal"
-    Yields D_1, D_2, …: float32 in [0, 1], one array per frame, the caller's own.
+    Yields D_1, D_2, …: float32 in [0, 1], one array per frame, the caller's own; nothing between 0 and
+    THINNEST.
     """
     density = None
     for i, F in enumerate(F_frames, 1):
         if density is None:
             density = _Lanes(_scaled(F, scale), 1, border)
         density.inject(sources, i)
-        density.step(density.departure(F, F.shape[:-1]))
+        density.advance(F, F.shape[:-1])
         yield density.q.get()
 
 
@@ -184,11 +186,12 @@ def windowed(L_frames: Iterable[np.ndarray], F_frames: Iterable[Motion], sources
         # O_i begins the next one, in the lane that has just been shown (or was never used)
         shown, begun = max(i - m, 0) % m, i % m
         coarse.inject(sources, i)
-        coarse.step(coarse.departure(L, F.shape[:-1]))
-        departure = coarse.departure(F, F.shape[:-1])
+        coarse.advance(L, F.shape[:-1])
+        flow = coarse.flow(F, F.shape[:-1])
+        visible.fill(0)
         for first, group in zip(range(0, m, lanes), windows, strict=True):
             group.inject(sources, i)
-            group.step(departure, coarse.q, visible, shown - first, begun - first)
+            group.step(flow, coarse, visible, shown - first, begun - first)
         yield visible.get()
 
 
@@ -203,10 +206,10 @@ def window(O: np.ndarray | None, F_frames: Sequence[Motion], sources: Sequence[S
     if O is not None:
         if O.shape != density.shape:
             raise ValueError(f"O has shape {O.shape}, the density grid {density.shape}")
-        density.q = opencl.to_device(np.asarray(O, np.float32))
+        density.begin(O)
     for j, F in enumerate(F_frames, i - len(F_frames) + 1):
         density.inject(sources, j)
-        density.step(density.departure(F, F.shape[:-1]))
+        density.advance(F, F.shape[:-1])
     return density.q.get()
 
 
@@ -216,59 +219,150 @@ def _scaled(F: Motion, scale: float) -> tuple[int, ...]:
     return tuple(max(1, round(n * scale)) for n in F.shape[:-1])
 
 
+Box = tuple[tuple[int, int], ...]
+"""First cell and end along x, y, z; with an end before the first there is nothing in it."""
+
+NOWHERE: Box = ((1 << 30, 0),) * 3
+
+
+def _around(*boxes: Box) -> Box:
+    """The smallest box round all of them."""
+    return tuple((min(b[c][0] for b in boxes), max(b[c][1] for b in boxes)) for c in range(3))
+
+
+class _Flow:
+    """The displacements of one frame on the density grid, found where they are asked for.
+
+    reach  no displacement is longer along any axis, cells
+    """
+
+    def __init__(self, v: Motion, field_shape: tuple[int, ...], grid: Grid, buffer: Any):
+        """v on its own cells goes linearly to the field's, from there smoothly to the density's."""
+        self._grid, self._buffer = grid, buffer
+        self._riding: Any = None
+        if isinstance(v, Carried):
+            L = _finer(v.L, v.shape[:-1], grid)
+            detail = _finer(v.F, v.shape[:-1], grid) - L
+            self._riding = _riding(L, detail, grid)
+            self.reach = _longest(L) + _longest(detail)
+        else:
+            fine = _finer(v, field_shape, grid)
+            self._v = opencl.to_device(fine)
+            self.reach = _longest(fine)
+
+    def displacements(self, region: Region) -> Any:
+        """The displacements, on the device, valid in `region`."""
+        if self._riding is not None:
+            return self._riding
+        return self._grid.departure(self._v, out=self._buffer, region=region)
+
+
+def _longest(v: np.ndarray) -> int:
+    """A bound, in whole cells, of each component of v, and of what interpolation and rounding make of it."""
+    return int(np.ceil(max(v.max(), -v.min()))) + 1
+
+
+def _finer(v: np.ndarray, field_shape: tuple[int, ...], grid: Grid) -> np.ndarray:
+    """`v` on the density grid: linearly to the field's cells, smoothly on to the density's."""
+    return upsample(upsample(velocity_field(v), field_shape), grid.shape, "cubic")
+
+
+def _riding(L: np.ndarray, detail: np.ndarray, grid: Grid) -> Any:
+    """Back along the detail alone, as L's traveller sees it, in SUBSTEPS; then back along L."""
+    inside = Grid(grid.shape, "toroidal" if grid.border == "toroidal" else "clamp")
+    substep = inside.departure(opencl.to_device(detail), 1 / SUBSTEPS)
+    way = substep
+    for _ in range(SUBSTEPS - 1):
+        way = way + inside.gather(substep, way)
+    return way + inside.gather(inside.departure(opencl.to_device(L)), way)
+
+
 class _Lanes:
-    """Densities of several windows on one grid, interleaved: `q` is (*shape, lanes) on the device, empty at
-    first."""
+    """Densities of several windows on one grid, interleaved: `q` is (*shape, lanes) on the device.
+
+    box  holds all smoke of all lanes, none at first; beyond it q is zero
+    """
 
     def __init__(self, shape: tuple[int, ...], lanes: int, border: str):
         self.shape, self.lanes = shape, lanes
         self.grid = Grid(shape, border)
-        self.q = opencl.zeros((*shape, lanes) if lanes > 1 else shape)
-        self._next = opencl.empty(self.q.shape)
+        self.q, self._next = (opencl.zeros((*shape, lanes) if lanes > 1 else shape) for _ in range(2))
+        self.box = self._next_box = NOWHERE
         self._displacements: Any = None
+        self._extents = opencl.empty((*shape[:-1], 2), np.int32)
         self._program = opencl.program(Path(__file__).with_suffix(".cl"), DIMS=len(shape), CHANNELS=lanes,
-                                       BORDER=BORDERS[border])
+                                       BORDER=BORDERS[border], THINNEST=f"{THINNEST}f")
+
+    def begin(self, density: np.ndarray) -> None:
+        """Take over a density (*shape); of a single lane only."""
+        self.q = opencl.to_device(np.asarray(density, np.float32))
+        self.box = tuple((0, n) for n in self._size())
 
     def inject(self, sources: Sequence[Source], frame: int) -> None:
         """Every source in turn, into every lane."""
         for source in sources:
-            box, lowest, highest = source.bounds(self.shape, frame)
-            corner = [s.start for s in box[::-1]] + [0] * (3 - len(box))
-            size = [*lowest.shape[::-1], 1][:3]
-            sizes = [np.int32(n) for n in (*corner, size[0], self.shape[-1], self.shape[-2])]
+            cells, lowest, highest = source.bounds(self.shape, frame)
+            box = tuple((s.start, s.stop) for s in cells[::-1]) + ((0, 1),) * (3 - len(cells))
+            size = [end - first for first, end in box]
+            sizes = [np.int32(n) for n in (*(first for first, _ in box), size[0], *self._size()[:2])]
             self._program.inject((-(-size[0] // ROW) * ROW, *size[1:]), (ROW, 1, 1), self.q,
                                  opencl.to_device(lowest), opencl.to_device(highest), *sizes)
+            self.box = _around(self.box, box)
 
-    def departure(self, v: Motion, field_shape: tuple[int, ...]) -> Any:
-        """Displacements by `v` on this grid."""
-        if isinstance(v, Carried):
-            return self._carried(v)
-        self._displacements = self.grid.departure(opencl.to_device(self._finer(v, field_shape)),
-                                                  out=self._displacements)
-        return self._displacements
+    def flow(self, v: Motion, field_shape: tuple[int, ...]) -> _Flow:
+        """The flow of one frame on this grid; the one before it is no longer valid."""
+        if self._displacements is None:
+            self._displacements = opencl.empty((*self.shape, len(self.shape)))
+        return _Flow(v, field_shape, self.grid, self._displacements)
 
-    def _finer(self, v: np.ndarray, field_shape: tuple[int, ...]) -> np.ndarray:
-        """`v` on this grid: linearly to the field's cells, smoothly on to the density's."""
-        return upsample(upsample(velocity_field(v), field_shape), self.shape, "cubic")
+    def advance(self, v: Motion, field_shape: tuple[int, ...]) -> None:
+        """A step along v of every lane."""
+        self.step(self.flow(v, field_shape), self, self.q, -1, -1)
 
-    def _carried(self, v: Carried) -> Any:
-        """Back along the detail alone, as L's traveller sees it, in SUBSTEPS; then back along L."""
-        L = self._finer(v.L, v.shape[:-1])
-        detail = self._finer(v.F, v.shape[:-1]) - L
-        inside = Grid(self.shape, "toroidal" if self.grid.border == "toroidal" else "clamp")
-        substep = inside.departure(opencl.to_device(detail), 1 / SUBSTEPS)
-        way = substep
-        for _ in range(SUBSTEPS - 1):
-            way = way + inside.gather(substep, way)
-        return way + inside.gather(inside.departure(opencl.to_device(L)), way)
-
-    def step(self, displacements: Any, fresh: Any = None, taken: Any = None, take: int = -1,
-             put: int = -1) -> None:
+    def step(self, flow: _Flow, fresh: _Lanes, taken: Any, take: int, put: int) -> None:
         """Advect every lane; then copy lane `take` to `taken`, and begin lane `put` anew from `fresh`."""
-        if fresh is None:
-            self.grid.gather(self.q, displacements, self._next)
-        else:
-            own = [np.int32(n if 0 <= n < self.lanes else -1) for n in (take, put)]
-            self._program.step_lanes(self.grid.work, (ROW, 1, 1), self.q, displacements, self._next, fresh,
-                                     taken, *own, *self.grid.cells)
-        self.q, self._next = self._next, self.q
+        own = [np.int32(n if 0 <= n < self.lanes else -1) for n in (take, put)]
+        # where the smoke may go, what `fresh` brings, and what the older buffer still holds and must lose
+        box = _around(self._reached(flow.reach), fresh.box, self._next_box)
+        region = self._region(box)
+        if min(region.size) > 0:
+            self._program.step_lanes(region.size, (ROW, 1, 1), self.q, flow.displacements(region), self._next,
+                                     fresh.q, taken, *own, *self.grid.cells, offset=region.first)
+        self.q, self._next, self._next_box = self._next, self.q, self.box
+        self.box = self._occupied(region)
+
+    def _size(self) -> tuple[int, ...]:
+        """Cells along x, y, z."""
+        return (*self.shape[::-1], 1)[:3]
+
+    def _reached(self, reach: int) -> Box:
+        """The box that this frame's smoke can reach: `reach` cells further each way."""
+        grown = []
+        for (first, end), n in zip(self.box, self._size(), strict=True):
+            wraps = self.grid.border == "toroidal" and first < end and (first < reach or end + reach > n)
+            grown.append((0, n) if wraps else (first - reach, end + reach))
+        return tuple(grown)
+
+    def _region(self, box: Box) -> Region:
+        """The cells of the grid in `box`, along x in whole work-groups; of no size if there are none."""
+        (x, x_end), (y, y_end), (z, z_end) = (
+            (max(first, 0), min(end, n)) for (first, end), n in zip(box, self._size(), strict=True))
+        if x >= x_end or y >= y_end or z >= z_end:
+            return Region((0, 0, 0), (0, 0, 0))
+        x -= x % ROW
+        return Region((x, y, z), (-(-(x_end - x) // ROW) * ROW, y_end - y, z_end - z))
+
+    def _occupied(self, region: Region) -> Box:
+        """The smallest box of all smoke, which is known to lie in `region`."""
+        (x, y, z), (width, rows, layers) = region
+        if min(region.size) == 0:
+            return NOWHERE
+        self._program.extent((rows, layers), None, self.q, self._extents, np.int32(x),
+                             np.int32(min(x + width, self.shape[-1])), *self.grid.cells[:2], offset=(y, z))
+        extents = self._extents.get().reshape(-1, self.shape[-2], 2)[z : z + layers, y : y + rows]
+        smoky = extents[..., 0] <= extents[..., 1]
+        if not smoky.any():
+            return NOWHERE
+        along_y, along_z = (np.flatnonzero(smoky.any(axis)) + first for axis, first in ((0, y), (1, z)))
+        return ((int(extents[..., 0][smoky].min()), int(extents[..., 1][smoky].max()) + 1),
+                (int(along_y[0]), int(along_y[-1]) + 1), (int(along_z[0]), int(along_z[-1]) + 1))
