@@ -11,6 +11,7 @@ import errno
 import os
 import signal
 import sys
+import threading
 import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -143,13 +144,39 @@ def farm(scene: SceneFile, /, *, workers: Annotated[int, Parameter(help="Process
     farming.run(scene, workers, batch, quick, out, quiet, dry_run)
 
 
+_asked_to_end = threading.Event()
+_heard = threading.Event()
+
+
 def _terminated(_signal: int, _frame: Any) -> None:
+    _heard.set()
     raise Terminated
+
+
+def _heed_signals() -> None:
+    """SIGTERM ends the work cleanly, also in the middle of a long render.
+
+    Python runs its handlers between two of its own instructions, so not while Mitsuba renders; but Mitsuba itself
+    heeds SIGINT. So where SIGTERM is not heard within a second, it is passed on as that.
+    """
+    signal.signal(signal.SIGTERM, _terminated)
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+
+    def pass_on() -> None:
+        while number := os.read(reader, 1):
+            if number[0] == signal.SIGTERM:
+                _asked_to_end.set()
+                while not _heard.wait(1.0):
+                    os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=pass_on, daemon=True).start()
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit with its code; every foreseen failure is one line on stderr."""
-    signal.signal(signal.SIGTERM, _terminated)
+    _heed_signals()
     sys.exit(run(sys.argv[1:] if arguments is None else list(arguments)))
 
 
@@ -161,10 +188,11 @@ def run(arguments: list[str]) -> int:
         return _say(f"{error}; flowloom --help shows what there is", 2)
     except FlowloomError as error:
         return _say(str(error), error.exit_code)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Terminated) as stop:
+        _heard.set()
+        if isinstance(stop, Terminated) or _asked_to_end.is_set():
+            return _say("terminated; run the same command again to go on from the last whole frame", 143)
         return _say("interrupted; run the same command again to go on from the last whole frame", 130)
-    except Terminated:
-        return _say("terminated; run the same command again to go on from the last whole frame", 143)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python complains at exit
         return 0

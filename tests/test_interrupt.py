@@ -123,6 +123,29 @@ def test_a_stopped_run_leaves_nothing_half_written_and_the_next_one_goes_on(
     assert run(tmp_path) == reference
 
 
+@pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_long_render_is_stopped_in_its_middle(tmp_path: Path, by: signal.Signals, code: int) -> None:
+    volume = SCENE.replace('kind = "lit"\nwidth = 32', 'kind = "volume"\nwidth = 400\nheight = 400\nspp = 4096').replace(
+        "m = 1\n", "m = 1\ndepth = { reach = 0.2 }\nsources = [{ centre = [0.0, 0.5], radius = 0.3 }]\n")
+    (tmp_path / "tiny.toml").write_text(volume)
+    # says so when Mitsuba is about to trace; that takes minutes
+    code_ = ("import pathlib, signal, sys; from pipeline import cli; from render import smoke; "
+             "traced = smoke.volume; "
+             "smoke.volume = lambda *a: (pathlib.Path('flag').touch(), traced(*a))[1]; "
+             "signal.signal(signal.SIGINT, signal.default_int_handler); cli.main(sys.argv[1:])")
+    process = subprocess.Popen([sys.executable, "-P", "-c", code_, "figure", "tiny.toml"], cwd=tmp_path,
+                               stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 100
+    while not (tmp_path / "flag").exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    time.sleep(3)
+    process.send_signal(by)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == code, err
+    assert "run the same command again" in err.splitlines()[-1]
+    assert not list((tmp_path / "out" / "tiny").rglob("beauty*"))
+
+
 def test_two_runs_at_once_end_with_the_same_bits(tmp_path: Path, reference: dict[str, bytes]) -> None:
     (tmp_path / "tiny.toml").write_text(SCENE)
     command = [sys.executable, "-P", "-m", "pipeline.cli", "figure", "tiny.toml"]
