@@ -1,0 +1,104 @@
+"""`python -m bench [synthesis] [search] [density] [repeat] [quality]`: measure, print tables, write out/bench.json."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from bench.machine import machine
+
+Row = tuple[str, str, str, str, str]
+HEADER = ("what", "here", "reach", "", "the paper, or the peer")
+
+
+def measured(module: str) -> dict[str, Any]:
+    """What `python -m bench.<module>` prints, run in a process of its own."""
+    child = subprocess.run([sys.executable, "-m", f"bench.{module}"], stdout=subprocess.PIPE, text=True, check=True)
+    found: dict[str, Any] = json.loads(child.stdout)
+    return found
+
+
+def verdict(met: bool) -> str:
+    return "met" if met else "MISSED"
+
+
+def seconds(times: dict[str, float]) -> str:
+    return f"{times['wall']:.2f} s ({times['processor']:.2f} s of processor)"
+
+
+def synthesis_rows(found: dict[str, Any]) -> Iterable[Row]:
+    for search, reach in (("exact", 3.0), ("k-coherence", 1.0)):
+        times = found[f"{search}, first"]
+        yield (f"ma09 2-D 64² to 256², {search}, first frame", seconds(times), f"{reach:g} s",
+               verdict(times["wall"] <= reach), "60 s on a CPU, 3 to 5 s on a GeForce 8800 GTX")
+        times = found[f"{search}, next"]
+        yield ("    a later frame", seconds(times), f"{reach:g} s", verdict(times["wall"] <= reach), "the same")
+    peak, rest = found["peak memory MB"], found["of it Python, libraries and PoCL at rest MB"]
+    yield ("    peak memory", f"{peak} MB ({rest} MB at rest)", "500 MB", verdict(peak <= 500), "not said")
+    times = found["times faster than the reference"]
+    yield ("    times faster than NumPy and SciPy", f"{times:.1f}", "10", verdict(times >= 10),
+           f"the reference: {seconds(found['reference'])}")
+
+
+def search_rows(found: dict[str, Any]) -> Iterable[Row]:
+    for dims, times in found.items():
+        yield (f"exact search, 65,536 on 4,096, {dims}", f"{times['ours']:.3f} s, {times['ratio']:.2f} of FAISS's",
+               "1.5 of FAISS's", verdict(times["ratio"] <= 1.5), f"FAISS flat: {times['FAISS']:.3f} s")
+
+
+def density_rows(found: dict[str, Any]) -> Iterable[Row]:
+    took, faster = found["seconds a frame"], found["times faster"]
+    yield (found["what"], f"{took:.2f} s a frame", "1.5 s", verdict(took <= 1.5), "not said")
+    yield ("    times faster than map_coordinates", f"{faster:.1f}", "6", verdict(faster >= 6),
+           f"SciPy: {found['scipy, seconds a frame']:.2f} s")
+
+
+def repeat_rows(found: dict[str, Any]) -> Iterable[Row]:
+    different = found["different results"]
+    yield ("same bits: 10 runs, 1 and 2 threads, cold and warm cache", f"{different} in {found['runs']} runs", "1",
+           verdict(different == 1), "not said")
+
+
+ROWS: dict[str, Callable[[dict[str, Any]], Iterable[Row]]] = {
+    "synthesis": synthesis_rows, "search": search_rows, "density": density_rows, "repeat": repeat_rows}
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Columns as wide as their widest entry; numbers to the right."""
+    lines = [list(header), *(["" if cell is None else cell for cell in line] for line in rows)]
+    widths = [max(len(str(line[i])) for line in lines) for i in range(len(header))]
+    return "\n".join("  ".join(str(cell).ljust(width) if isinstance(cell, str) else str(cell).rjust(width)
+                               for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines)
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+    options.add_argument("parts", nargs="*", metavar="part", help=f"{', '.join([*ROWS, 'quality'])}; all without")
+    chosen = options.parse_args().parts or [*ROWS, "quality"]
+    if unknown := set(chosen) - {*ROWS, "quality"}:
+        options.error(f"no part is called {', '.join(sorted(unknown))}")
+    found: dict[str, Any] = {"machine": machine()}
+    print("\n".join(f"{key}: {value}" for key, value in found["machine"].items()), flush=True)
+    rows: list[Row] = []
+    for part in chosen:
+        print(f"... {part}", file=sys.stderr, flush=True)
+        found[part] = measured(part)
+        rows += ROWS[part](found[part]) if part in ROWS else []
+    if rows:
+        print(f"\n{table(HEADER, rows)}")
+    if "quality" in found:
+        for name, lines in found["quality"].items():
+            print(f"\n{name}\n{table(list(lines[0]), (list(line.values()) for line in lines))}")
+    written = Path("out/bench.json")
+    written.parent.mkdir(exist_ok=True)
+    written.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    print(f"\nwritten: {written}")
+
+
+if __name__ == "__main__":
+    main()
