@@ -144,32 +144,33 @@ def farm(scene: SceneFile, /, *, workers: Annotated[int, Parameter(help="Process
     farming.run(scene, workers, batch, quick, out, quiet, dry_run)
 
 
+PATIENCE = 2.0  # seconds between two reminders
 _asked_to_end = threading.Event()
-_heard = threading.Event()
+_ending = threading.Event()
 
 
 def _terminated(_signal: int, _frame: Any) -> None:
-    _heard.set()
     raise Terminated
 
 
 def _heed_signals() -> None:
     """SIGTERM ends the work cleanly, also in the middle of a long render.
 
-    Python runs its handlers between two of its own instructions, so not while Mitsuba renders; but Mitsuba itself
-    heeds SIGINT. So where SIGTERM is not heard within a second, it is passed on as that.
+    Python runs its handlers between two of its own instructions, so not while Mitsuba renders, and drops what they
+    raise in a callback; but Mitsuba itself heeds SIGINT. So SIGTERM is passed on as that until the work ends.
     """
     signal.signal(signal.SIGTERM, _terminated)
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    main_thread = threading.main_thread().ident or 0  # only there does Mitsuba take it for itself
 
     def pass_on() -> None:
         while number := os.read(reader, 1):
             if number[0] == signal.SIGTERM:
                 _asked_to_end.set()
-                while not _heard.wait(1.0):
-                    os.kill(os.getpid(), signal.SIGINT)
+                while not _ending.wait(PATIENCE):
+                    signal.pthread_kill(main_thread, signal.SIGINT)
 
     threading.Thread(target=pass_on, daemon=True).start()
 
@@ -189,7 +190,7 @@ def run(arguments: list[str]) -> int:
     except FlowloomError as error:
         return _say(str(error), error.exit_code)
     except (KeyboardInterrupt, Terminated) as stop:
-        _heard.set()
+        _ending.set()
         if isinstance(stop, Terminated) or _asked_to_end.is_set():
             return _say("terminated; run the same command again to go on from the last whole frame", 143)
         return _say("interrupted; run the same command again to go on from the last whole frame", 130)

@@ -88,7 +88,10 @@ def stopped(folder: Path, name: str, by: signal.Signals) -> subprocess.Completed
     while not flag.exists() and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.01)
     process.send_signal(by)
-    out, err = process.communicate(timeout=50)
+    try:
+        out, err = process.communicate(timeout=50)
+    finally:
+        process.kill()
     assert flag.exists(), err
     return subprocess.CompletedProcess(command, process.returncode, out, err)
 
@@ -125,7 +128,8 @@ def test_a_stopped_run_leaves_nothing_half_written_and_the_next_one_goes_on(
 
 @pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_long_render_is_stopped_in_its_middle(tmp_path: Path, by: signal.Signals, code: int) -> None:
-    volume = SCENE.replace('kind = "lit"\nwidth = 32', 'kind = "volume"\nwidth = 400\nheight = 400\nspp = 4096').replace(
+    render = 'kind = "volume"\nwidth = 400\nheight = 400\nspp = 4096'
+    volume = SCENE.replace('kind = "lit"\nwidth = 32', render).replace(
         "m = 1\n", "m = 1\ndepth = { reach = 0.2 }\nsources = [{ centre = [0.0, 0.5], radius = 0.3 }]\n")
     (tmp_path / "tiny.toml").write_text(volume)
     # says so when Mitsuba is about to trace; that takes minutes
@@ -140,7 +144,10 @@ def test_a_long_render_is_stopped_in_its_middle(tmp_path: Path, by: signal.Signa
         time.sleep(0.01)
     time.sleep(3)
     process.send_signal(by)
-    _, err = process.communicate(timeout=60)
+    try:
+        _, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
     assert process.returncode == code, err
     assert "run the same command again" in err.splitlines()[-1]
     assert not list((tmp_path / "out" / "tiny").rglob("beauty*"))
