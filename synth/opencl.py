@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -73,13 +74,19 @@ class Program:
             raise AttributeError(name)
         # one cl.Kernel per name: fetching it anew for each call is slow and warns
         if name not in self._kernels:
-            self._kernels[name] = getattr(self._program, name)
-        kernel = self._kernels[name]
+            self._kernels[name] = self._launcher(getattr(self._program, name))
+        return self._kernels[name]
+
+    @staticmethod
+    def _launcher(kernel: Any) -> Callable[..., None]:
+        import pyopencl.array as cl_array
+
+        arrays = (cl_array.Array, np.ndarray)
 
         def launch(global_size: tuple[int, ...], local_size: tuple[int, ...] | None, *args: Any,
                    offset: tuple[int, ...] | None = None) -> None:
-            kernel(_queue(), global_size, local_size,
-                   *(getattr(a, "data", a) if not np.isscalar(a) else a for a in args), global_offset=offset)
+            kernel(_queue(), global_size, local_size, *(a.data if isinstance(a, arrays) else a for a in args),
+                   global_offset=offset)
 
         return launch
 
