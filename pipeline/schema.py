@@ -175,7 +175,7 @@ class Combine(Table):
 
 
 class Source(Table):
-    """Where smoke enters, in every frame: D = max(D, source) (supplement A: "inject density sources").
+    """Where smoke enters, in every frame (supplement A: "inject density sources").
     World units: the domain is 1 high, its floor at y = 0, centred on x = 0 and z = 0."""
 
     kind: Literal["ball", "box"] = key("its form", "ball")
@@ -235,7 +235,7 @@ class VolumeRender(Table):
     height: int = key("of the picture", 640, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
     denoised: bool = key("fit the paths to guides without noise", True)
-    extinction: float = key("of smoke of density 1", 80.0, "per height", gt=0, le=10000)
+    extinction: float = key("of smoke of density 1", 110.0, "per height", gt=0, le=10000)
     bowl: Annotated[tuple[Share, Share], Strict(False)] | None = key(
         "radius and height of the bowl that the plume rises from", None, "heights")
 

@@ -16,6 +16,8 @@ from scipy.ndimage import gaussian_filter
 SHARPNESS = 4  # how fast a neighbourhood that is partly empty stops counting
 OCCUPIED = 8.0  # even thin smoke fills its place: half full at a density of 0.09
 FINEST = 0.5  # cells: the smallest neighbourhood
+RELIEF = 1.2  # how far differences of density inside a body stand out of it
+RIDGES = ((0.006, 0.2), (0.02, 0.3))  # their widths, world units, and the most each adds
 
 
 def inflate(D: np.ndarray, reach: float = 0.06) -> np.ndarray:
@@ -32,7 +34,9 @@ def inflate(D: np.ndarray, reach: float = 0.06) -> np.ndarray:
     if D.ndim != 2:
         raise ValueError(f"a density in the plane is (Y, X), not {D.shape}")
     depth = layers(D.shape[0], reach)
-    half = _half_depth(np.asarray(D, np.float32), reach * D.shape[0])
+    D = np.asarray(D, np.float32)
+    half = _half_depth(D, reach * D.shape[0])
+    half = np.clip(half * _relief(D), 0, depth // 2 - 0.5)
     z = np.abs(np.arange(depth, dtype=np.float32) - (depth - 1) / 2)[:, None, None]
     inside = np.clip(0.5 * (half - z) + 0.5, 0, 1)  # the surface is two cells soft
     inside[depth // 2] = 1.0  # what is thinner than a cell is one cell thick
@@ -45,6 +49,22 @@ def layers(rows: int, reach: float) -> int:
     if not 2 / rows <= reach <= 0.5:
         raise ValueError(f"the reach must lie between two cells ({2 / rows:g}) and 0.5, not at {reach}")
     return 2 * math.ceil(reach * rows + 1) + 1
+
+
+def _relief(D: np.ndarray) -> np.ndarray:
+    """By what dense ridges deepen a body and thin grooves flatten it: a factor round 1.
+
+    Without it dense smoke is one smooth body and hides the motifs in it. Densities are compared with the mean of the
+    smoke round them, not with the air, so a thread of even density stays as it is.
+    """
+    occupied = -np.expm1(-np.float32(OCCUPIED) * D)
+    factor = np.ones_like(D)
+    for width, most in RIDGES:
+        spread = width * D.shape[0]
+        mean = gaussian_filter(D * occupied, spread, mode="nearest") / np.maximum(
+            gaussian_filter(occupied, spread, mode="nearest"), 1e-6)
+        factor += np.float32(RELIEF * most) * np.tanh(np.float32(3 / most) * (D - mean) * occupied)
+    return factor
 
 
 def _half_depth(D: np.ndarray, reach: float) -> np.ndarray:
