@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 FAULT = 70  # EX_SOFTWARE of sysexits.h
 OUT = Path("out")
+STOPPED: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+GO_ON = "run the same command again to go on from the last whole frame"
 OURS = ("pipeline", "synth", "render")
 
 app = App(
@@ -144,8 +146,7 @@ def farm(scene: SceneFile, /, *, workers: Annotated[int, Parameter(help="Process
     farming.run(scene, workers, batch, quick, out, quiet, dry_run)
 
 
-PATIENCE = 2.0  # seconds between two reminders
-_asked_to_end = threading.Event()
+GRACE = 5.0  # seconds
 _ending = threading.Event()
 
 
@@ -154,25 +155,25 @@ def _terminated(_signal: int, _frame: Any) -> None:
 
 
 def _heed_signals() -> None:
-    """SIGTERM ends the work cleanly, also in the middle of a long render.
+    """SIGINT and SIGTERM end the work cleanly, and within a few seconds even in the middle of a long render.
 
     Python runs its handlers between two of its own instructions, so not while Mitsuba renders, and drops what they
-    raise in a callback; but Mitsuba itself heeds SIGINT. So SIGTERM is passed on as that until the work ends.
+    raise in a callback of a library. Where the work has not ended by itself after GRACE, the process ends at once:
+    no file is ever half there, and the temporary of one that was being written is removed by the next run.
     """
     signal.signal(signal.SIGTERM, _terminated)
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-    main_thread = threading.main_thread().ident or 0  # only there does Mitsuba take it for itself
 
-    def pass_on() -> None:
+    def watch() -> None:
         while number := os.read(reader, 1):
-            if number[0] == signal.SIGTERM:
-                _asked_to_end.set()
-                while not _ending.wait(PATIENCE):
-                    signal.pthread_kill(main_thread, signal.SIGINT)
+            if number[0] in STOPPED and not _ending.wait(GRACE):
+                if sys.stderr.isatty():
+                    sys.stderr.write("\x1b[?25h")  # the progress hides the cursor
+                os._exit(_say(f"{STOPPED[number[0]]}; {GO_ON}", 128 + number[0]))
 
-    threading.Thread(target=pass_on, daemon=True).start()
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -191,9 +192,8 @@ def run(arguments: list[str]) -> int:
         return _say(str(error), error.exit_code)
     except (KeyboardInterrupt, Terminated) as stop:
         _ending.set()
-        if isinstance(stop, Terminated) or _asked_to_end.is_set():
-            return _say("terminated; run the same command again to go on from the last whole frame", 143)
-        return _say("interrupted; run the same command again to go on from the last whole frame", 130)
+        number = signal.SIGTERM if isinstance(stop, Terminated) else signal.SIGINT
+        return _say(f"{STOPPED[number]}; {GO_ON}", 128 + number)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python complains at exit
         return 0
