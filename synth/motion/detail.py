@@ -48,6 +48,11 @@ class Settings:
     k: int = 4
     along: str = "x"
 
+    @property
+    def few(self) -> int:
+        """Half the iterations: for a frame that flowed on and is nearly there, and to tell a good start from a bad."""
+        return (self.iterations + 1) // 2
+
 
 def enough_levels(size: int) -> int:
     """As many levels as bring an exemplar of `size` cells down to 8: with fewer, the coarsest neighbourhoods see
@@ -70,18 +75,15 @@ class Level:
                                 self.settings.k), Assigner(self.exemplar, width // 2, neighborhood.spacing(width)))
                 for width in self.settings.neighborhoods]
 
-    def optimize(self, H: np.ndarray, frame: np.ndarray,
+    def optimize(self, H: np.ndarray, frame: np.ndarray, iterations: int,
                  coherence: np.ndarray | None = None) -> tuple[np.ndarray, float]:
-        """Search and assign, round after round; returns H (Y, X, 2) and the mean distance of its last matches.
+        """Search and assign, `iterations` times with each width of neighbourhoods.
 
-        `coherence` (Y, X) holds the result to H as it came, the frame before, warped: the O(x) of Eq. 1. Such a
-        frame is nearly there when it begins, so half the iterations do.
+        H, frame (Y, X, 2); `coherence` (Y, X) holds the result to H as it came, the frame before, warped: the O(x)
+        of Eq. 1. Returns H (Y, X, 2) and the mean distance of its last matches as a share of the exemplar's rms.
         """
-        iterations = self.settings.iterations
         if coherence is None:
             coherence = np.zeros(frame.shape[:2], np.float32)
-        else:
-            iterations = (iterations + 1) // 2
         x = prior = opencl.to_device(H)
         hold = opencl.to_device(coherence)
         for width, matcher, assigner in self.steps:
@@ -135,7 +137,7 @@ class Synthesis:
         done = [self._start(frames[0])]
         for level, frame in zip(self.levels[1:], frames[1:], strict=True):
             H = initialize.reseed(_finer(done[-1], frame.shape[:2]), level.exemplar, frame)
-            done.append(level.optimize(H, frame)[0])
+            done.append(level.optimize(H, frame, level.settings.iterations)[0])
         return done
 
     def _next(self, motions: list[np.ndarray], frames: list[np.ndarray], state: State) -> list[np.ndarray]:
@@ -149,7 +151,7 @@ class Synthesis:
                 H = H + _finer(done[-1] - warped[i - 1], H.shape[:2])
             H = initialize.reseed(H, level.exemplar, frames[i])
             bent = deformation(ways[i], state.frame[i], frames[i]) / DEFORMED
-            done.append(level.optimize(H, frames[i], COHERENCE / (1 + bent**2))[0])
+            done.append(level.optimize(H, frames[i], level.settings.few, COHERENCE / (1 + bent**2))[0])
         return done
 
     def visible(self, state: State) -> np.ndarray:
@@ -157,22 +159,21 @@ class Synthesis:
         return np.ascontiguousarray(state.H[-1][MARGIN:-MARGIN, MARGIN:-MARGIN])
 
     def _start(self, frame: np.ndarray) -> np.ndarray:
-        """The coarsest level of the first frame: the best of several mosaics after optimization."""
+        """The coarsest level of the first frame: of several mosaics the one that promises most, optimized."""
         level = self.levels[0]
         rms = np.sqrt(np.mean(level.exemplar**2))
         best, least = None, np.inf
         for start in range(STARTS):
             random = np.random.Generator(np.random.Philox(key=[self.seed, start]))
-            H = level.optimize(initialize.mosaic(level.exemplar, frame, random), frame)[0]
-            sown = initialize.reseed(H, level.exemplar, frame)
-            H, distance = level.optimize(sown, frame)
+            mosaic = initialize.mosaic(level.exemplar, frame, random)
+            H, distance = level.optimize(mosaic, frame, level.settings.few)
             inside = H[MARGIN:-MARGIN, MARGIN:-MARGIN]
             # the distance alone would choose the emptiest
             score = distance + abs(np.sqrt(np.mean(inside**2)) / rms - 1)
             if score < least:
                 best, least = H, score
         assert best is not None
-        return best
+        return level.optimize(initialize.reseed(best, level.exemplar, frame), frame, level.settings.iterations)[0]
 
 
 def deformation(way: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
