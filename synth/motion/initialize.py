@@ -80,10 +80,10 @@ def _owners(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray) -> tuple[
     _, index = cKDTree(centres).query(cells, k=min(NEAREST, len(centres)))
     index = index.reshape(len(cells), -1)
     at = np.rint(centres).astype(int)
-    e = frame[np.clip(at[:, 1], 0, frame.shape[0] - 1), np.clip(at[:, 0], 0, frame.shape[1] - 1)][index]
-    way = cells[:, None] - centres[index]
-    offset = np.stack([e[..., 0] * way[..., 0] + e[..., 1] * way[..., 1],
-                       e[..., 0] * way[..., 1] - e[..., 1] * way[..., 0]], axis=-1)
-    choice = np.abs(offset).max(axis=-1).argmin(axis=1)
+    e = frame[np.clip(at[:, 1], 0, frame.shape[0] - 1), np.clip(at[:, 0], 0, frame.shape[1] - 1)]
+    e_x, e_y = e[:, 0][index], e[:, 1][index]
+    way_x, way_y = (cells[:, i, None] - centres[:, i][index] for i in (0, 1))
+    x, y = e_x * way_x + e_y * way_y, e_x * way_y - e_y * way_x
+    nearest = np.maximum(np.abs(x), np.abs(y)).argmin(axis=1)
     rows = np.arange(len(cells))
-    return index[rows, choice], offset[rows, choice]
+    return index[rows, nearest], np.stack([x[rows, nearest], y[rows, nearest]], axis=-1)
