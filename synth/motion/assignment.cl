@@ -3,19 +3,31 @@
 // -D RADIUS   half width of the neighbourhoods
 // -D SPACING  distance of the sites on their grid
 // -D FIRST    position of the first site
+// -D REACH    cells from its centre to its corner, rounded up
 // -D BORDER   cells by which the exemplar was continued toroidally on each side
 
-// Catmull-Rom: interpolates (exact at cells) and, unlike linear weights, does not blur between them. Four cells
-// of a row are one vector; a, b, c, d weigh the cells at -1, 0, 1, 2 along x and along y.
-inline float2 sample(__global const float2 *field, int pitch, float2 at) {
-    const float2 low = floor(at), t = at - low;
-    const float2 a = 0.5f * ((2.0f - t) * t - 1.0f) * t, b = 0.5f * ((3.0f * t - 5.0f) * t * t + 2.0f);
-    const float2 c = 0.5f * ((4.0f - 3.0f * t) * t + 1.0f) * t, d = 0.5f * (t - 1.0f) * t * t;
-    const int first = ((int)low.y - 1 + BORDER) * pitch + (int)low.x - 1 + BORDER;
-    __global const float *row = (__global const float *)(field + first);
-    const float8 sum = a.y * vload8(0, row) + b.y * vload8(0, row + 2 * pitch) + c.y * vload8(0, row + 4 * pitch) +
-                       d.y * vload8(0, row + 6 * pitch);
-    return a.x * sum.s01 + b.x * sum.s23 + c.x * sum.s45 + d.x * sum.s67;
+// Catmull-Rom: interpolates (exact at cells) and, unlike linear weights, does not blur between them. The weights of
+// the cells at -1, 0, 1, 2 are cubics in t. Four cells of a row are one vector, each weight there twice; what is
+// returned is to be added up over the cells: many samples first, which is cheaper.
+inline float8 spread_sample(__global const float2 *field, int pitch, float2 at) {
+    // continued, at lies right of and above the first cell: cutting off is rounding down, without the cost of floor
+    at += BORDER;
+    const int2 low = convert_int2(at);
+    const float2 t = at - convert_float2(low);
+    const float4 w = ((float4)(-0.5f, 1.5f, -1.5f, 0.5f) * t.y + (float4)(1.0f, -2.5f, 2.0f, -0.5f)) * t.y * t.y +
+                     (float4)(-0.5f, 0.0f, 0.5f, 0.0f) * t.y + (float4)(0.0f, 1.0f, 0.0f, 0.0f);
+    const float8 along =
+        ((float8)(-0.5f, -0.5f, 1.5f, 1.5f, -1.5f, -1.5f, 0.5f, 0.5f) * t.x +
+         (float8)(1.0f, 1.0f, -2.5f, -2.5f, 2.0f, 2.0f, -0.5f, -0.5f)) * t.x * t.x +
+        (float8)(-0.5f, -0.5f, 0.0f, 0.0f, 0.5f, 0.5f, 0.0f, 0.0f) * t.x +
+        (float8)(0.0f, 0.0f, 1.0f, 1.0f, 0.0f, 0.0f, 0.0f, 0.0f);
+    __global const float *row = (__global const float *)(field + (low.y - 1) * pitch + low.x - 1);
+    return along * (w.x * vload8(0, row) + w.y * vload8(0, row + 2 * pitch) + w.z * vload8(0, row + 4 * pitch) +
+                    w.w * vload8(0, row + 6 * pitch));
+}
+
+inline float2 added(float8 s) {
+    return (s.s01 + s.s23) + (s.s45 + s.s67);
 }
 
 // squared distances (S) of matches -> weights (S) of the robust error
@@ -32,28 +44,29 @@ __kernel void average(__global const float2 *exemplar, int pitch, __global const
                       int2 grid, __global const float2 *prior, __global const float *coherence,
                       __global float2 *out) {
     const int x = get_global_id(0), y = get_global_id(1), width = get_global_size(0);
-    const float reach = 1.41421357f * RADIUS;
-    const int left = max(0, (int)ceil((x - reach - FIRST) / SPACING));
-    const int right = min(grid.x - 1, (int)floor((x + reach - FIRST) / SPACING));
-    const int bottom = max(0, (int)ceil((y - reach - FIRST) / SPACING));
-    const int top = min(grid.y - 1, (int)floor((y + reach - FIRST) / SPACING));
-    float2 sum = (float2)(0.0f);
+    // the sites whose neighbourhoods, however turned, may reach here lie in a circle
+    const int bottom = max(0, y - REACH - FIRST + SPACING - 1) / SPACING;
+    const int top = min(grid.y - 1, (y + REACH - FIRST) / SPACING);
+    float8 sum = (float8)(0.0f);
     float total = 0.0f;
     for (int gy = bottom; gy <= top; gy++) {
         const int way_y = y - (gy * SPACING + FIRST);
+        const int half_row = sqrt((float)(REACH * REACH - way_y * way_y));
+        const int left = max(0, x - half_row - FIRST + SPACING - 1) / SPACING;
+        const int right = min(grid.x - 1, (x + half_row - FIRST) / SPACING);
         for (int gx = left; gx <= right; gx++) {
             const int way_x = x - (gx * SPACING + FIRST), s = gy * grid.x + gx;
             const float2 e = axis[s];
             const float2 o = (float2)(e.x * way_x + e.y * way_y, e.x * way_y - e.y * way_x);
             if (max(fabs(o.x), fabs(o.y)) > RADIUS + 0.001f) continue;
             const float w = falloff[abs(way_x)] * falloff[abs(way_y)] * weight[s];
-            sum += w * sample(exemplar, pitch, position[s] + o);
+            sum = fma(w, spread_sample(exemplar, pitch, position[s] + o), sum);
             total += w;
         }
     }
     const float2 before = prior[y * width + x];
     const float hold = coherence[y * width + x];
-    out[y * width + x] = total > 0.0f ? (sum / total + hold * before) / (1.0f + hold) : before;
+    out[y * width + x] = total > 0.0f ? (added(sum) / total + hold * before) / (1.0f + hold) : before;
 }
 
 // The frame before, carried by the flow: field continued by BORDER, displacement (Y, X) to where each cell's
@@ -63,5 +76,5 @@ __kernel void carry(__global const float2 *field, int pitch, __global const floa
     const int x = get_global_id(0), y = get_global_id(1), width = get_global_size(0);
     const float2 last = (float2)(width - 1, get_global_size(1) - 1);
     const float2 at = clamp((float2)(x, y) + displacement[y * width + x], (float2)(0.0f), last);
-    out[y * width + x] = sample(field, pitch, at);
+    out[y * width + x] = added(spread_sample(field, pitch, at));
 }

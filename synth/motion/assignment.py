@@ -89,10 +89,14 @@ class Assigner:
     def _border(self) -> int:
         return self.radius + 3
 
+    @property
+    def _reach(self) -> int:
+        return int(np.ceil(np.sqrt(2) * self.radius))
+
     @cached_property
     def _program(self) -> Any:
         return opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=self.radius, SPACING=self.spacing,
-                              FIRST=self.spacing // 2, BORDER=self._border)
+                              FIRST=self.spacing // 2, REACH=self._reach, BORDER=self._border)
 
     @cached_property
     def _continued(self) -> tuple[Any, np.int32]:
@@ -103,7 +107,7 @@ class Assigner:
 
     @cached_property
     def _falloff(self) -> Any:
-        away = np.arange(int(np.sqrt(2) * self.radius) + 2)
+        away = np.arange(self._reach + 1)
         return opencl.to_device(np.exp(-falloff(self.radius) * away**2).astype(np.float32))
 
     def weights(self, squared: Any, length: int, rms: float) -> Any:
@@ -136,7 +140,7 @@ def carry(field: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     Catmull-Rom, clamped at the border; displacement as `synth.advect.departure` gives it.
     """
     border = 2
-    program = opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=0, SPACING=1, FIRST=0, BORDER=border)
+    program = opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=0, SPACING=1, FIRST=0, REACH=0, BORDER=border)
     out = opencl.empty(field.shape)
     padded = np.pad(field, ((border, border), (border, border), (0, 0)), mode="edge")
     program.carry(field.shape[1::-1], None, opencl.to_device(padded), np.int32(padded.shape[1]),
