@@ -76,11 +76,12 @@ class Level:
                 for width in self.settings.neighborhoods]
 
     def optimize(self, H: np.ndarray, frame: np.ndarray, iterations: int,
-                 coherence: np.ndarray | None = None) -> tuple[np.ndarray, float]:
+                 coherence: np.ndarray | None = None) -> tuple[Any, Any]:
         """Search and assign, `iterations` times with each width of neighbourhoods.
 
         H, frame (Y, X, 2); `coherence` (Y, X) holds the result to H as it came, the frame before, warped: the O(x)
-        of Eq. 1. Returns H (Y, X, 2) and the mean distance of its last matches as a share of the exemplar's rms.
+        of Eq. 1. Returns H (Y, X, 2) and the squared distances (S,) of its last matches, both still on the device,
+        which works on while this returns.
         """
         if coherence is None:
             coherence = np.zeros(frame.shape[:2], np.float32)
@@ -99,8 +100,12 @@ class Level:
                     z, squared = matcher.coherent(queries, sites, axis, grid, z)
                 weights = assigner.weights(squared, matcher.space.length, self.rms)
                 x = assigner.average(matcher.refine(queries, z), weights, axis, grid, prior, hold)
-        distance = np.sqrt(squared.get() / matcher.space.length)
-        return x.get(), float(np.mean(distance)) / self.rms
+        return x, squared
+
+    def distance(self, squared: Any) -> float:
+        """The mean distance of the last matches, as a share of the exemplar's rms; squared (S,) as optimize gives."""
+        length = self.steps[-1][1].space.length
+        return float(np.mean(np.sqrt(squared.get() / length))) / self.rms
 
 
 @dataclass(frozen=True)
@@ -137,7 +142,7 @@ class Synthesis:
         done = [self._start(frames[0])]
         for level, frame in zip(self.levels[1:], frames[1:], strict=True):
             H = initialize.reseed(_finer(done[-1], frame.shape[:2]), level.exemplar, frame)
-            done.append(level.optimize(H, frame, level.settings.iterations)[0])
+            done.append(level.optimize(H, frame, level.settings.iterations)[0].get())
         return done
 
     def _next(self, motions: list[np.ndarray], frames: list[np.ndarray], state: State) -> list[np.ndarray]:
@@ -151,7 +156,7 @@ class Synthesis:
                 H = H + _finer(done[-1] - warped[i - 1], H.shape[:2])
             H = initialize.reseed(H, level.exemplar, frames[i])
             bent = deformation(ways[i], state.frame[i], frames[i]) / DEFORMED
-            done.append(level.optimize(H, frames[i], level.settings.few, COHERENCE / (1 + bent**2))[0])
+            done.append(level.optimize(H, frames[i], level.settings.few, COHERENCE / (1 + bent**2))[0].get())
         return done
 
     def visible(self, state: State) -> np.ndarray:
@@ -162,18 +167,21 @@ class Synthesis:
         """The coarsest level of the first frame: of several mosaics the one that promises most, optimized."""
         level = self.levels[0]
         rms = np.sqrt(np.mean(level.exemplar**2))
-        best, least = None, np.inf
-        for start in range(STARTS):
+        trials = []
+        for start in range(STARTS):  # the device optimizes one while the next is laid
             random = np.random.Generator(np.random.Philox(key=[self.seed, start]))
-            mosaic = initialize.mosaic(level.exemplar, frame, random)
-            H, distance = level.optimize(mosaic, frame, level.settings.few)
+            trials.append(level.optimize(initialize.mosaic(level.exemplar, frame, random), frame, level.settings.few))
+        best, least = None, np.inf
+        for optimized, squared in trials:
+            H = optimized.get()
             inside = H[MARGIN:-MARGIN, MARGIN:-MARGIN]
             # the distance alone would choose the emptiest
-            score = distance + abs(np.sqrt(np.mean(inside**2)) / rms - 1)
+            score = level.distance(squared) + abs(np.sqrt(np.mean(inside**2)) / rms - 1)
             if score < least:
                 best, least = H, score
         assert best is not None
-        return level.optimize(initialize.reseed(best, level.exemplar, frame), frame, level.settings.iterations)[0]
+        best = initialize.reseed(best, level.exemplar, frame)
+        return level.optimize(best, frame, level.settings.iterations)[0].get()
 
 
 def deformation(way: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -133,7 +133,7 @@ def similar_sets(points: np.ndarray, k: int) -> np.ndarray:
     """For each of points (E, D) the k nearest, itself first: (E, k) int32; equal distances in order of index."""
     from scipy.spatial import cKDTree
 
-    _, index = cKDTree(points).query(points, k=min(k, len(points)))
+    _, index = cKDTree(points).query(points, k=min(k, len(points)), workers=-1)
     index = index.reshape(len(points), -1).astype(np.int32)
     own = np.arange(len(points), dtype=np.int32)[:, None]
     # among identical neighbourhoods the tree may name another one first
