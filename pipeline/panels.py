@@ -35,11 +35,6 @@ def read_light(file: Path, scene: Scene) -> np.ndarray:
     return images.read_picture(file)
 
 
-def linear(display: np.ndarray) -> np.ndarray:
-    """The light that `film.developed(…, "straight")` shows as these display values."""
-    return np.where(display <= 0.04045, display / 12.92, ((np.maximum(display, 0.04045) + 0.055) / 1.055) ** 2.4)
-
-
 def make_beauty(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The smoke: lit, ink or a volume."""
     from render import smoke
@@ -61,14 +56,14 @@ def make_beauty(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
 
 def make_input(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The exemplar as figure 4 shows it: a bitmap itself, the colours of any other."""
-    from render import lic
+    from render import film, lic
 
     width = scene.figure.panel
     if scene.exemplar.kind in ("bitmap", "drawing") and scene.exemplar.file.suffix != ".svg":
         picture = pictures.read_foreign(scene.exemplar.file, "exemplar.file")
-        yield 0, linear(np.clip(pictures.resized(picture, width, lic.height_for(picture.shape, width)), 0, 1))
+        yield 0, film.decoded(np.clip(pictures.resized(picture, width, lic.height_for(picture.shape, width)), 0, 1))
     else:
-        yield 0, linear(lic.colour(stock.read("exemplar").values, width))
+        yield 0, film.decoded(lic.colour(stock.read("exemplar").values, width))
 
 
 def field_values(name: str, scene: Scene, stock: Stock, frame: int) -> np.ndarray:
@@ -88,7 +83,7 @@ def maker(name: str, style: str) -> Callable[[Scene, Stock, list[int]], Iterator
     """Makes the pictures of field `name` in `style`: lines, colour or arrows."""
 
     def make(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
-        from render import lic
+        from render import film, lic
 
         width = scene.figure.panel
         for frame in frames:
@@ -97,7 +92,7 @@ def maker(name: str, style: str) -> Callable[[Scene, Stock, list[int]], Iterator
             if style == "arrows":
                 wrong = stock.read("H", frame).values if name == "detail" else None
                 shown = with_arrows(shown, values, wrong)
-            yield frame, linear(shown)
+            yield frame, film.decoded(shown)
 
     return make
 

@@ -138,6 +138,8 @@ def _load(variant: str, library: Path | None) -> Any:
     resolver.clear()
     resolver.append(str(Path(mitsuba.__file__).parent))
     mitsuba.set_variant(variant)
+    # an interrupted render is ours to report, in one line
+    mitsuba.set_log_level(mitsuba.LogLevel.Error)
     return mitsuba
 
 

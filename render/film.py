@@ -27,6 +27,11 @@ def encoded(linear: np.ndarray) -> np.ndarray:
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
 
 
+def decoded(display: np.ndarray) -> np.ndarray:
+    """The inverse of `encoded`: the linear values that it shows as these in [0, 1]."""
+    return np.where(display <= 0.04045, display / 12.92, ((np.maximum(display, 0.04045) + 0.055) / 1.055) ** 2.4)
+
+
 def developed(light: np.ndarray, curve: Curve) -> np.ndarray:
     """Linear light (h, w, 3) as sRGB display values (h, w, 3) float32 in [0, 1].
 

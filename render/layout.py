@@ -58,13 +58,8 @@ def fitted(picture: np.ndarray, width: int) -> np.ndarray:
     if width > w:
         rows, columns = np.arange(height) * h // height, np.arange(width) * w // width
         return np.ascontiguousarray(shown[rows][:, columns])
-    narrower = _averaged_rows(_averaged_rows(_linear(shown), height).swapaxes(0, 1), width).swapaxes(0, 1)
+    narrower = _averaged_rows(_averaged_rows(film.decoded(shown), height).swapaxes(0, 1), width).swapaxes(0, 1)
     return film.encoded(narrower).astype(np.float32)
-
-
-def _linear(shown: np.ndarray) -> np.ndarray:
-    """The inverse of `film.encoded`."""
-    return np.where(shown <= 0.04045, shown / 12.92, ((np.maximum(shown, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
 def _averaged_rows(values: np.ndarray, count: int) -> np.ndarray:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from render import layout, lic
+from render import film, layout, lic
 from render.layout import Panel
 
 
@@ -97,8 +97,8 @@ def test_fitting_up_repeats_pixels_and_down_averages_light() -> None:
 
 def test_fitting_to_an_odd_width_keeps_the_mean() -> None:
     light = np.random.Generator(np.random.Philox(key=2)).random((30, 50, 3)).astype(np.float32)
-    fitted = layout._linear(layout.fitted(light, 17))
-    assert fitted.mean() == pytest.approx(layout._linear(light).mean(), rel=1e-4)
+    fitted = film.decoded(layout.fitted(light, 17))
+    assert fitted.mean() == pytest.approx(film.decoded(light).mean(), rel=1e-4)
 
 
 def test_no_panels_is_refused() -> None:

@@ -54,7 +54,7 @@ def picture(panel: str, **tables: Any) -> np.ndarray:
 
 def test_a_display_value_comes_back_from_its_light() -> None:
     shown = np.linspace(0, 1, 300, dtype=np.float32).reshape(10, 10, 3)
-    np.testing.assert_allclose(film.developed(panels.linear(shown), "straight"), shown, atol=1e-6)
+    np.testing.assert_allclose(film.developed(film.decoded(shown), "straight"), shown, atol=1e-6)
 
 
 @pytest.mark.parametrize("panel", Panel.__args__)
@@ -72,12 +72,12 @@ def test_only_what_is_shown_is_made_and_the_smoke() -> None:
 
 def test_a_field_is_shown_as_the_renderer_draws_it() -> None:
     combined = Fields().read("F").values
-    np.testing.assert_allclose(picture("combined"), panels.linear(lic.picture(combined, 32, 1)))
-    np.testing.assert_allclose(picture("combined-colour"), panels.linear(lic.colour(combined, 32)))
+    np.testing.assert_allclose(picture("combined"), film.decoded(lic.picture(combined, 32, 1)))
+    np.testing.assert_allclose(picture("combined-colour"), film.decoded(lic.colour(combined, 32)))
 
 
 def test_the_input_is_the_bitmap_itself_or_the_colours_of_a_procedure(tmp_path: Path) -> None:
-    np.testing.assert_allclose(picture("input"), panels.linear(lic.colour(exemplar("circle", 8), 32)))
+    np.testing.assert_allclose(picture("input"), film.decoded(lic.colour(exemplar("circle", 8), 32)))
     shown = film.developed(picture("input", exemplar={"kind": "bitmap", "file": "assets/lightning.png", "size": 16}),
                            "straight")
     bitmap = pictures.read(PROJECT_SCENES / "assets" / "lightning.png")
@@ -89,5 +89,5 @@ def test_arrows_of_the_detail_are_red_where_right_and_green_where_not_transforme
     plain, drawn = (picture(p, figure={"panels": [p], "panel": 192}) for p in ("detail", "detail-arrows"))
     touched = np.abs(plain - drawn).max(-1) > 0.2
     for colour in (arrows.RED, arrows.GREEN):
-        near = np.abs(drawn - panels.linear(np.array(colour))).max(-1) < 0.05
+        near = np.abs(drawn - film.decoded(np.array(colour))).max(-1) < 0.05
         assert (near & touched).sum() > 10

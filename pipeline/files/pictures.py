@@ -135,12 +135,10 @@ def flip(reference: np.ndarray, test: np.ndarray) -> np.ndarray:
     """The visible difference (h, w), 0 to 1, of two sRGB pictures (h, w, 3): FLIP, 67 pixels a degree."""
     import OpenImageIO as oiio
 
-    linear = [oiio.ImageBuf(np.ascontiguousarray(_linear(p), dtype=np.float32)) for p in (reference, test)]
+    from render import film
+
+    linear = [oiio.ImageBuf(np.ascontiguousarray(film.decoded(p), dtype=np.float32)) for p in (reference, test)]
     result = oiio.ImageBufAlgo.FLIP_diff(*linear, hdr=0, ppd=67.0)
     if result.has_error:
         raise ValueError(f"FLIP: {_first_line(result.geterror())}")
     return np.asarray(result.get_pixels("float")).reshape(*reference.shape[:2], -1)[..., 0]
-
-
-def _linear(srgb: np.ndarray) -> np.ndarray:
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)

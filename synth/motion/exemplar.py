@@ -17,6 +17,7 @@ copies of the outline and rests outside it.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -34,6 +35,19 @@ STROKE_REACH = 0.08  # of the tile: where the flow beside a thin stroke has died
 DRAWING_PIXELS = 1024  # a drawing with a longer side is reduced to it: more shows no finer strokes
 INK = 0.25  # how far a pixel's tone, 0 to 1, is from the paper's to count as ink
 SVG_CHARACTERS, SVG_SEGMENTS = 1_000_000, 20_000  # more is an attack or a mistake
+
+
+def _opencv() -> Any:
+    """OpenCV, imported when needed. Its import appends an empty entry to LD_LIBRARY_PATH, with which child processes
+    would load libraries from their working directory: the variable is put back."""
+    before = os.environ.get("LD_LIBRARY_PATH")
+    import cv2
+
+    if before is None:
+        os.environ.pop("LD_LIBRARY_PATH", None)
+    else:
+        os.environ["LD_LIBRARY_PATH"] = before
+    return cv2
 
 
 def exemplar(kind: str, size: int) -> Array:
@@ -189,7 +203,7 @@ def from_field(values: ArrayLike, size: int, toroidal: bool = False) -> Array:
 
     Returns (size, size, 2) float32. Raises ValueError for a field that is blank, not finite or tiny.
     """
-    import cv2
+    cv2 = _opencv()
 
     _check_size(size)
     v = _square_crop(_checked(values, 3, "the field"))
@@ -212,7 +226,7 @@ def from_clip(frames: Iterable[ArrayLike], size: int) -> Array:
     Returns (size, size, 2) float32. Raises ValueError for fewer than two frames, frames of different or too
     small a size, non-finite values, or a clip in which nothing moves.
     """
-    import cv2
+    cv2 = _opencv()
 
     flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     total: Any = 0.0
@@ -314,7 +328,7 @@ def _bounds(strokes: Sequence[Floats]) -> tuple[Floats, Floats]:
 
 def _ink(picture: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Where the drawing has ink and where that is red, both (S, S), the picture centred on square paper."""
-    import cv2
+    cv2 = _opencv()
 
     tones = _tones(picture)
     tones = _checked(tones[..., None] if tones.ndim == 2 else tones, 3, "the drawing")
@@ -336,7 +350,7 @@ def _ink(picture: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
 
 def _traced(ink: NDArray[np.bool_], red: NDArray[np.bool_]) -> tuple[list[Floats], float]:
     """The strokes as directed (n, 2) polylines x, y in the unit tile, and half their mean width."""
-    import cv2
+    cv2 = _opencv()
     from scipy.ndimage import gaussian_filter1d
 
     mask = ink.astype(np.uint8) * 255
