@@ -1,8 +1,8 @@
 """Kwatra's texture optimization as one would write it with NumPy and SciPy, to be measured against.
 
-The same levels, sites, widths, iterations, projection and kind of weights as `synth.motion.detail`, with
-`map_coordinates` to sample, a `cKDTree` on both cores to search and `bincount` to add up. It starts from random
-pixels, once, as the paper does; ours tries several mosaics.
+The first frame of `synth.motion.detail` step for step: the same starts, levels, sites, widths, iterations,
+projection and kind of weights, with `map_coordinates` to sample, a `cKDTree` on all cores to search and `bincount`
+to add up.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ import numpy as np
 from scipy.ndimage import map_coordinates, zoom
 from scipy.spatial import cKDTree
 
+from synth.motion import initialize
+
 ROBUST, EXACT, EDGE = 0.8, 0.05, 0.1
 VARIANCE_KEPT, MOST_DIMS = 0.995, 64
-MARGIN = 8
+MARGIN, STARTS = 8, 8
 
 
 def sampled(field: np.ndarray, x: np.ndarray, y: np.ndarray, mode: str) -> np.ndarray:
@@ -42,8 +44,8 @@ class Neighborhoods:
 
 
 def iteration(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray, near: Neighborhoods, radius: int,
-              rms: float) -> np.ndarray:
-    """One search and one assignment."""
+              rms: float) -> tuple[np.ndarray, float]:
+    """One search and one assignment: H (Y, X, 2), and the mean distance of the matches."""
     rows, columns = H.shape[:2]
     spacing = max(1, (2 * radius + 1) // 4)
     x, y = (g.ravel() for g in np.meshgrid(np.arange(spacing // 2, columns, spacing),
@@ -53,7 +55,7 @@ def iteration(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray, near: Neig
     j, i = (g.ravel() for g in np.meshgrid(span, span, indexing="ij"))
     at_x, at_y = turned(axis, i, j)
     patches = sampled(H, x[:, None] + at_x, y[:, None] + at_y, "nearest").reshape(len(x), -1)
-    distance, match = near.tree.query((patches - near.mean) @ near.basis, workers=2)
+    distance, match = near.tree.query((patches - near.mean) @ near.basis, workers=-1)
     weight = (1 + distance**2 / patches.shape[1] / (EXACT * rms) ** 2) ** (ROBUST / 2 - 1)
 
     reach = int(np.ceil(np.sqrt(2) * radius))
@@ -72,7 +74,33 @@ def iteration(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray, near: Neig
     cell = cell_y[covered] * columns + cell_x[covered]
     total = np.bincount(cell, w, rows * columns)
     mean = [np.bincount(cell, w * laid[:, c], rows * columns) / np.maximum(total, 1e-12) for c in (0, 1)]
-    return np.where(total[:, None] > 0, np.stack(mean, axis=-1), H.reshape(-1, 2)).reshape(H.shape)
+    assigned = np.where(total[:, None] > 0, np.stack(mean, axis=-1), H.reshape(-1, 2)).reshape(H.shape)
+    return assigned, float(distance.mean()) / np.sqrt(patches.shape[1]) / rms
+
+
+def optimized(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray, near: dict[int, Neighborhoods],
+              iterations: int, rms: float) -> tuple[np.ndarray, float]:
+    """Search and assign, `iterations` times with each width."""
+    distance = 0.0
+    for width in near:
+        for _ in range(iterations):
+            H, distance = iteration(H, exemplar, frame, near[width], width // 2, rms)
+    return H, distance
+
+
+def start(exemplar: np.ndarray, frame: np.ndarray, near: dict[int, Neighborhoods], iterations: int, rms: float,
+          seed: int) -> np.ndarray:
+    """The mosaic that promises most after half the iterations."""
+    best, least = exemplar, np.inf
+    for trial in range(STARTS):
+        random = np.random.Generator(np.random.Philox(key=[seed, trial]))
+        mosaic = initialize.mosaic(exemplar, frame, random)
+        H, distance = optimized(mosaic, exemplar, frame, near, (iterations + 1) // 2, rms)
+        inside = H[MARGIN:-MARGIN, MARGIN:-MARGIN]
+        score = distance + abs(np.sqrt(np.mean(inside**2) / np.mean(exemplar**2)) - 1)
+        if score < least:
+            best, least = H, score
+    return best
 
 
 def synthesize(exemplar: np.ndarray, L: np.ndarray, levels: int, widths: tuple[int, ...] = (17, 9),
@@ -87,14 +115,11 @@ def synthesize(exemplar: np.ndarray, L: np.ndarray, levels: int, widths: tuple[i
     for I, motion in zip(exemplars[::-1], motions[::-1], strict=True):
         grown = np.pad(motion, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="edge")
         frame = grown / np.maximum(np.linalg.norm(grown, axis=-1, keepdims=True), 1e-12)
+        near = {width: Neighborhoods(I, width // 2) for width in widths}
         if H is None:
-            random = np.random.Generator(np.random.Philox(key=seed))
-            H = I.reshape(-1, 2)[random.integers(I.shape[0] * I.shape[1], size=grown.shape[:2])]
+            H = start(I, frame, near, iterations, rms, seed)
         else:
             inner = H[MARGIN // 2:-MARGIN // 2, MARGIN // 2:-MARGIN // 2]
             H = zoom(inner, (2, 2, 1), order=1, mode="nearest", grid_mode=True)
-        for width in widths:
-            near = Neighborhoods(I, width // 2)
-            for _ in range(iterations):
-                H = iteration(H, I, frame, near, width // 2, rms)
+        H, _ = optimized(initialize.reseed(H, I, frame), I, frame, near, iterations, rms)
     return H[MARGIN:-MARGIN, MARGIN:-MARGIN]
