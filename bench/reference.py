@@ -8,6 +8,7 @@ to add up.
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import eigh
 from scipy.ndimage import map_coordinates, zoom
 from scipy.spatial import cKDTree
 
@@ -37,9 +38,10 @@ class Neighborhoods:
         patches = windows.transpose(0, 1, 3, 4, 2).reshape(exemplar.shape[0] * exemplar.shape[1], -1)
         self.mean = patches.mean(0)
         centred = patches - self.mean
-        values, vectors = np.linalg.eigh(centred.T @ centred)
-        kept = int(np.searchsorted(np.cumsum(values[::-1]) / values.sum(), VARIANCE_KEPT)) + 1
-        self.basis = vectors[:, ::-1][:, :min(kept, MOST_DIMS)]
+        covariance = centred.T @ centred
+        values, vectors = eigh(covariance, subset_by_index=(len(covariance) - MOST_DIMS, len(covariance) - 1))
+        kept = int(np.searchsorted(np.cumsum(values[::-1]) / np.trace(covariance), VARIANCE_KEPT)) + 1
+        self.basis = vectors[:, ::-1][:, :kept]
         self.tree = cKDTree(centred @ self.basis)
 
 
