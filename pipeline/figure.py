@@ -35,11 +35,13 @@ def make(works: Works, progress: Progress) -> None:
     still = scenes[0].figure.frame or last
     folder = manifest.Folder(works.root)
     png, mp4 = f"{works.scenes.name}.png", f"{works.scenes.name}.mp4"
-    keys = {png: _key(works, [still]), mp4: _key(works, range(1, last + 1))}
+    keys = {png: _key(works, [still])}
+    if scenes[0].figure.animation:
+        keys[mp4] = _key(works, range(1, last + 1))
     if not folder.whole(png, keys[png]):
         pictures.write(works.root / png, sheet(works, still))
         folder.add(png, keys[png])
-    if not folder.whole(mp4, keys[mp4]):
+    if mp4 in keys and not folder.whole(mp4, keys[mp4]):
         with progress.task("figure", last) as advance:
 
             def sheets() -> Iterator[np.ndarray]:

@@ -60,8 +60,12 @@ class Product:
         return f"{self.name}{number}.{self.suffix(scene)}"
 
     def frames(self, scene: Scene) -> list[int]:
-        """The frames there are: 1 to scene.frames, or [0]."""
-        return list(range(1, scene.frames + 1)) if self.animated else [0]
+        """The frames there are: 1 to scene.frames; the still's alone where there is no animation; or [0]."""
+        if not self.animated:
+            return [0]
+        if self.stage != "synth" and not scene.figure.animation:
+            return [scene.figure.frame or scene.frames]
+        return list(range(1, scene.frames + 1))
 
     def reads_files(self, scene: Scene) -> bool:
         """Whether its content depends on files that the scene names."""

@@ -261,6 +261,7 @@ class Figure(Table):
     columns: int = key("panels in a row; 0: all", 0, ge=0, le=64)
     panel: int = key("width of a panel", 512, "pixels", ge=16, le=LARGEST)
     frame: int = key("the frame the still shows; 0: the last", 0, ge=0, le=100000)
+    animation: bool = key("make X.mp4 too; else bake and render the still's frame alone", True)
 
 
 class Scene(Table):

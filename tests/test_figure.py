@@ -96,3 +96,11 @@ def test_too_few_or_too_many_labels_are_refused(tmp_path: Path) -> None:
 
     with pytest.raises(BadInput, match=r"figure.labels: 1 labels for 2 panels"):
         works(tmp_path, '["exemplar", "coarse"]', 'labels = ["one"]\n')
+
+
+def test_without_an_animation_only_the_stills_frame_is_made(tmp_path: Path, laid: list) -> None:
+    made = works(tmp_path, '["combined"]', "frame = 2\nanimation = false\n")
+    assert len(laid) == 1
+    assert (made.root / "tiny.png").is_file() and not (made.root / "tiny.mp4").exists()
+    assert [file.name for file in sorted((made.root / "geometry").glob("F.*"))] == ["F.0002.exr"]
+    assert len(list((made.root / "fields").glob("H.*.exr"))) == 2
