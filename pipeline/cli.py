@@ -185,7 +185,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def run(arguments: list[str]) -> int:
     """Run a command; its exit code."""
     try:
-        return app(arguments, exit_on_error=False, print_error=False) or 0
+        code = app(arguments, exit_on_error=False, print_error=False) or 0
+        sys.stdout.flush()  # a pipe that is closed is noticed here, not while Python exits
+        return code
     except CycloptsError as error:
         return _say(f"{error}; flowloom --help shows what there is", 2)
     except FlowloomError as error:
