@@ -11,9 +11,12 @@ import numpy as np
 KERNEL = np.array([1, 3, 3, 1], np.float32) / 8
 
 
-def reduce(field: np.ndarray, toroidal: bool) -> np.ndarray:
-    """The next coarser level: (Y, X[, C]) float32 -> (ceil(Y / 2), ceil(X / 2)[, C]); edges wrap or repeat."""
-    for axis in (0, 1):
+def reduce(field: np.ndarray, toroidal: bool, dimension: int = 2) -> np.ndarray:
+    """The next coarser level: ([Z, ]Y, X[, C]) float32 -> half of each, rounded up; edges wrap or repeat.
+
+    dimension  2 or 3, the axes there are before those of components
+    """
+    for axis in range(dimension):
         size = field.shape[axis]
         half = -(-size // 2)
         coarse = np.arange(half)
@@ -26,17 +29,17 @@ def reduce(field: np.ndarray, toroidal: bool) -> np.ndarray:
     return field
 
 
-def pyramid(field: np.ndarray, levels: int, toroidal: bool) -> list[np.ndarray]:
-    """The levels of a field, coarsest first; the last is the field itself."""
+def pyramid(field: np.ndarray, levels: int, toroidal: bool, dimension: int = 2) -> list[np.ndarray]:
+    """The levels of a field of so many dimensions, coarsest first; the last is the field itself."""
     fields = [field]
     for _ in range(levels - 1):
-        fields.append(reduce(fields[-1], toroidal))
+        fields.append(reduce(fields[-1], toroidal, dimension))
     return fields[::-1]
 
 
-def resample(field: np.ndarray, shape: tuple[int, int], offset: tuple[float, float], scale: float) -> np.ndarray:
-    """Linear samples of field (Y, X[, C]) at (row, column) * scale + offset for each cell of `shape`; edges repeat."""
-    for axis in (0, 1):
+def resample(field: np.ndarray, shape: tuple[int, ...], offset: tuple[float, ...], scale: float) -> np.ndarray:
+    """Linear samples of field ([Z, ]Y, X[, C]) at cell * scale + offset for each cell of `shape`; edges repeat."""
+    for axis in range(len(shape)):
         size = field.shape[axis]
         at = np.clip(np.arange(shape[axis], dtype=np.float32) * scale + offset[axis], 0, size - 1)
         low = np.minimum(at.astype(int), max(size - 2, 0))

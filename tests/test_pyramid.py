@@ -82,3 +82,18 @@ def test_a_finer_level_stands_where_its_coarser_one_did():
     back = resample(reduce(bump, False), (32, 48), (-0.25, -0.25), 0.5)
     for grid, centre in ((x, 21), (y, 14)):
         assert (back * grid).sum() / back.sum() == pytest.approx(centre, abs=1e-3)
+
+
+@BOTH
+def test_a_field_constant_along_z_is_reduced_in_each_layer(toroidal):
+    layer = field((5, 7, 3))
+    coarse = reduce(np.broadcast_to(layer, (6, 5, 7, 3)), toroidal, dimension=3)
+    assert coarse.shape == (3, 3, 4, 3)
+    for z in range(3):
+        np.testing.assert_allclose(coarse[z], reduce(layer, toroidal), atol=1e-6)
+
+
+def test_three_dimensions_are_sampled_linearly():
+    ramp = np.stack(np.meshgrid(np.arange(4.0), np.arange(3.0), np.arange(5.0), indexing="ij"), -1)
+    fine = resample(ramp.astype(np.float32), (4, 3, 5), (0.5, 0.25, 0.0), 0.5)
+    np.testing.assert_allclose(fine[2, 1, 3], [1.5, 0.75, 1.5])

@@ -109,8 +109,11 @@ class Space:
 
     def project(self, field: Any, sites: Any, axis: Any) -> Any:
         """The oriented neighbourhoods, as in `gather`, in this space: device array (S, D)."""
-        count = sites.shape[0]
-        patches, out = self.gather(field, sites, axis), opencl.empty((count, self.dims))
+        return self.compare(self.gather(field, sites, axis), sites.shape[0])
+
+    def compare(self, patches: Any, count: int) -> Any:
+        """The first `count` of patches (S, C), S a multiple of SITES_TOGETHER, in this space: device (count, D)."""
+        out = opencl.empty((count, self.dims))
         self._program.project((self.dims // 16, len(patches) // SITES_TOGETHER), (1, 1), patches,
                               *self._basis_and_mean, np.int32(count), out)
         return out
@@ -121,12 +124,16 @@ class Space:
 
 
 def space(exemplar: np.ndarray, radius: int) -> Space:
-    """Principal components of the toroidal neighbourhoods of exemplar (N, M, 2), ordered by variance.
+    """Principal components of the toroidal neighbourhoods of exemplar (N, M, 2), ordered by variance."""
+    return space_of(exemplar_patches(exemplar, radius), radius)
+
+
+def space_of(patches: np.ndarray, radius: int) -> Space:
+    """Principal components of neighbourhoods (E, C) of a radius, ordered by variance.
 
     Keeps as many as hold 99.5 % of the variance, 64 at most. One thread of BLAS: its sums, and with them
     the basis, would otherwise depend on the number of threads.
     """
-    patches = exemplar_patches(exemplar, radius)
     mean = patches.mean(axis=0, dtype=np.float64)
     centred = patches - mean
     with threadpool_limits(1):
