@@ -12,20 +12,24 @@ from __future__ import annotations
 import copy
 import difflib
 import functools
+import math
 import re
 import tomllib
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from pipeline.errors import BadInput
-from pipeline.schema import Scene
+from pipeline.schema import Scene, View
 
 Raw = Mapping[str, Any]
+FLAT = ("lit", "ink")  # kinds of [render] that draw a plane
+MOST_APART = 4  # at most so much larger is an exemplar than another: at the coarsest level a 9² neighbourhood sees both
 WORDS = (  # pydantic's for ours
     ("Input should", "should"),
     ("a valid dictionary or object to extract fields from", "a table"),
@@ -155,9 +159,12 @@ def _first_fault(raw: Raw, error: ValidationError) -> tuple[str, str]:
     key = ""
     table: Any = raw
     model: type[BaseModel] = Scene
+    field: FieldInfo | None = None
     for part in fault["loc"]:
         if isinstance(part, int):
             key += f"[{part}]"
+            table = table[part] if isinstance(table, list) and part < len(table) else {}
+            model = _model_of(field.annotation if field else None, table) or model
         elif isinstance(table, Mapping) and (part in table or part == fault["loc"][-1]):
             key += f".{part}" if key else part
             field = model.model_fields.get(part)
@@ -213,22 +220,133 @@ def _did_you_mean(given: str, known: Any) -> str:
 
 def _fault_between_tables(scene: Scene) -> tuple[str, str]:
     """Dotted key and reason of values that are fine each and impossible together; ("", "") if all is well."""
-    exemplar, detail = scene.exemplar, scene.detail
-    columns, rows = detail.size
-    if exemplar.size > min(columns, rows):
-        return "exemplar.size", f"an exemplar of {exemplar.size}² is larger than the output ({columns}×{rows})"
-    if scene.coarse.kind != "file" and columns * scene.coarse.size[1] != rows * scene.coarse.size[0]:
-        coarse = "×".join(map(str, scene.coarse.size))
-        return "detail.size", f"{columns}×{rows} has not the shape of coarse.size, {coarse}"
-    if isinstance(detail.levels, int) and exemplar.size >> (detail.levels - 1) < 4:
-        return "detail.levels", f"{detail.levels} levels bring an exemplar of {exemplar.size}² below 4 cells"
-    if (scene.density.depth is not None) != (scene.render.kind == "volume") and scene.render.kind != "none":
-        need = "needs a [density.depth]" if scene.render.kind == "volume" else "draws no volume, but density.depth is"
-        return "render.kind", f'"{scene.render.kind}" {need}'
-    if scene.figure.frame > scene.frames:
-        return "figure.frame", f"the animation has {scene.frames} frames"
-    if scene.figure.labels and len(scene.figure.labels) != len(scene.figure.panels):
-        return "figure.labels", f"{len(scene.figure.labels)} labels for {len(scene.figure.panels)} panels"
-    if "result" in scene.figure.panels and scene.render.kind == "none":
-        return "figure.panels", 'there is no "result" with render.kind = "none"'
+    for faults in (_flat_and_deep, _exemplar, _grids, _views, _shown):
+        for key, reason in faults(scene):
+            return key, reason
     return "", ""
+
+
+Faults = Iterator[tuple[str, str]]
+
+
+def _flat_and_deep(scene: Scene) -> Faults:
+    """What is for a field in the plane and what is for one in space."""
+    detail, density, render = scene.detail, scene.density, scene.render
+    size = _sized(detail.size)
+    if scene.coarse.kind != "file" and len(scene.coarse.size) != scene.dimension:
+        yield "coarse.size", f"{_sized(scene.coarse.size)} has not as many axes as detail.size, {size}"
+    if scene.dimension == 2:
+        need = f"needs a field in space; detail.size is {size}"
+        if scene.views:
+            yield "views", need
+        if detail.facing != "camera":
+            yield "detail.facing", need
+        if scene.figure.plane != "front":
+            yield "figure.plane", need
+        for number, source in enumerate(density.sources):
+            if len(source.centre) != 2:
+                yield f"density.sources[{number}].centre", need
+        if (density.depth is not None) != (render.kind == "volume") and render.kind != "none":
+            need = "needs a [density.depth]" if render.kind == "volume" else "draws no volume, but density.depth is"
+            yield "render.kind", f'"{render.kind}" {need}'
+    else:
+        if density.depth is not None:
+            yield "density.depth", f"gives a plane a body; detail.size is {size}, which has one"
+        if render.kind in FLAT:
+            yield "render.kind", f'"{render.kind}" draws smoke in a plane; detail.size is {size}'
+    if (detail.facing == "directions") != bool(detail.directions):
+        yield "detail.directions", ("is missing, for facing = \"directions\"" if not detail.directions else
+                                    f"is not used with facing = \"{detail.facing}\"")
+    for number, direction in enumerate(detail.directions):
+        if not any(direction.vector):
+            yield f"detail.directions[{number}].vector", "is zero: it faces nowhere"
+
+
+def _exemplar(scene: Scene) -> Faults:
+    """The exemplar of a field in the plane."""
+    if scene.dimension == 3:
+        return
+    size, levels = scene.exemplar.size, scene.detail.levels
+    if size > min(scene.detail.size):
+        yield "exemplar.size", f"an exemplar of {size}² is larger than the output ({_sized(scene.detail.size)})"
+    if isinstance(levels, int) and size >> (levels - 1) < 4:
+        yield "detail.levels", f"{levels} levels bring an exemplar of {size}² below 4 cells"
+
+
+def _views(scene: Scene) -> Faults:
+    """The views of a field in space (§3.2): whole, of one scale, smaller than the output, and enough of them."""
+    if scene.dimension == 2:
+        return
+    smallest = min(_exemplar_of(view).size for view in scene.seen)
+    for number, view in enumerate(scene.seen):
+        exemplar, where = _exemplar_of(view), f"views[{number}]"
+        if not view.plane and not (view.right and view.up):
+            yield where, "needs a plane, or both right and up"
+            return
+        if view.plane and (view.right or view.up):
+            yield f"{where}.plane", "says what right and up say too: leave one out"
+        if _parallel(*view.axes):
+            yield f"{where}.up", "is parallel to right, or one of them is zero: they span no plane"
+        spanned = [n for n, *along in zip(scene.detail.size, *view.axes, strict=True) if any(along) or view.solid]
+        size, power = exemplar.size, "³" if view.solid else "²"
+        key = f"{where}.exemplar.size" if scene.views and scene.views[number].exemplar else "exemplar.size"
+        if size > min(spanned):
+            output = _sized(scene.detail.size)
+            yield key, f"an exemplar of {size}{power} is larger than the output ({output}) along an axis of its view"
+        if size > MOST_APART * smallest:
+            yield key, f"an exemplar of {size}{power} beside one of {smallest}²: at most {MOST_APART} times as large"
+    blind = not any(view.solid for view in scene.seen) and _unseen([a for view in scene.seen for a in view.axes])
+    if blind:
+        yield "views", f"do not span space: none of them shows {blind}"
+    levels = scene.detail.levels
+    if isinstance(levels, int) and smallest >> (levels - 1) < 4:
+        yield "detail.levels", f"{levels} levels bring an exemplar of {smallest}² below 4 cells"
+
+
+def _exemplar_of(view: View) -> Any:
+    return view.exemplar
+
+
+def _parallel(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Whether two vectors of space span no plane to speak of."""
+    cross = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    return math.hypot(*cross) <= 1e-3 * math.hypot(*a) * math.hypot(*b)
+
+
+def _unseen(vectors: Sequence[Sequence[float]]) -> str:
+    """The direction that all vectors, of which two span a plane, are perpendicular to; "" if they span space."""
+    a = vectors[0]
+    b = next(v for v in vectors if not _parallel(a, v))
+    normal = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    unit = [n / math.hypot(*normal) for n in normal]
+    for v in vectors:
+        if abs(sum(n * c for n, c in zip(unit, v, strict=True))) > 1e-3 * math.hypot(*v):
+            return ""
+    axis = next((name for name, n in zip("xyz", unit, strict=True) if abs(n) > 0.995), "")
+    return (axis or "(" + ", ".join(f"{n:.2g}" for n in unit) + ")") + " of the local frame"
+
+
+def _grids(scene: Scene) -> Faults:
+    """Grids that have to fit each other."""
+    detail = scene.detail.size
+    if scene.coarse.kind == "file":
+        return
+    coarse = scene.coarse.size
+    if any(n * coarse[1] != detail[1] * m for n, m in zip(detail, coarse, strict=True)):
+        yield "detail.size", f"{_sized(detail)} has not the shape of coarse.size, {_sized(coarse)}"
+
+
+def _shown(scene: Scene) -> Faults:
+    """What the figure shows."""
+    figure = scene.figure
+    if figure.frame > scene.frames:
+        yield "figure.frame", f"the animation has {scene.frames} frames"
+    if figure.labels and len(figure.labels) != len(figure.panels):
+        yield "figure.labels", f"{len(figure.labels)} labels for {len(figure.panels)} panels"
+    if "result" in figure.panels and scene.render.kind == "none":
+        yield "figure.panels", 'there is no "result" with render.kind = "none"'
+
+
+def _sized(size: Sequence[int]) -> str:
+    """A size as the user reads it: 96×128×96."""
+    return "×".join(map(str, size))

@@ -41,8 +41,10 @@ class Table(BaseModel):
 
 
 def key(description: str, default: Any = ..., unit: str = "", **limits: Any) -> Any:
-    """A key of a table with what scenes/README.md says of it."""
-    return Field(default, description=description, json_schema_extra={"unit": unit}, **limits)
+    """A key of a table with what scenes/README.md says of it. A default that depends on other keys is a function
+    of those before it; its description says what it gives."""
+    kind = "default_factory" if callable(default) else "default"
+    return Field(**{kind: default}, description=description, json_schema_extra={"unit": unit}, **limits)
 
 
 Asset = Annotated[Path, Strict(False), AfterValidator(_inside)]
@@ -61,7 +63,15 @@ def _several(value: object) -> object:
 Width = Annotated[int, Field(ge=3, le=33), AfterValidator(_odd)]
 Cells = Annotated[int, Field(ge=4, le=LARGEST)]
 Share = Annotated[float, Field(gt=0, le=1)]
-Cells2 = Annotated[tuple[Cells, Cells], Strict(False)]
+Vector = Annotated[tuple[Annotated[float, Field(ge=-1000, le=1000)], ...], Strict(False)]
+
+
+def grid(description: str, default: Any) -> Any:
+    """The key `size` of a field: two numbers in the plane, three in space."""
+    return key(f"{description}; in 3-D layers (z) too", default, "cells", min_length=2, max_length=3)
+
+
+Grid = Annotated[tuple[Cells, ...], Strict(False)]
 
 
 class ProceduralExemplar(Table):
@@ -92,9 +102,14 @@ class FieldExemplar(Table):
     """A field made elsewhere."""
 
     kind: Literal["field"] = key("a field")
-    file: Asset = key("EXR (channels x, y) or VDB (grid vel, its middle slice), any unit")
-    size: int = key("edge, to which its central square is resampled", 64, "cells", ge=8, le=1024)
+    file: Asset = key("EXR (channels x, y) or VDB (grid vel; its middle slice, in 3-D all of it), any unit")
+    size: int = key("edge, to which its central square or cube is resampled", 64, "cells", ge=8, le=1024)
     toroidal: bool = key("take out the jumps where the tile's borders meet", False)
+
+    @property
+    def solid(self) -> bool:
+        """Whether it fills a volume, where the scene is in 3-D."""
+        return self.file.suffix == ".vdb"
 
 
 class ClipExemplar(Table):
@@ -112,7 +127,7 @@ class SmokeMotion(Table):
     """L by simulation: stable fluids with vorticity confinement (§4: [Fedkiw et al. 2001])."""
 
     kind: Literal["smoke"] = key("a plume that rises from a hot ball")
-    size: Cells2 = key("columns and rows of L", (64, 64), "cells")
+    size: Grid = grid("columns and rows of L", (64, 64))
     radius: float = key("of the hot ball", 0.08, "heights", gt=0, le=0.5)
     height: float = key("of the hot ball's centre", 0.1, "heights", ge=0, le=1)
     buoyancy: float = key("acceleration of the hottest smoke", 9.5e-4, "heights per frame²", ge=0, le=0.1)
@@ -127,7 +142,7 @@ class NoiseMotion(Table):
     """L by curl noise ([Bridson et al. 2007], of figure 7)."""
 
     kind: Literal["curl-noise"] = key("the curl of a random potential")
-    size: Cells2 = key("columns and rows of L", (64, 64), "cells")
+    size: Grid = grid("columns and rows of L", (64, 64))
     octaves: int = key("each of half the size of the one before", 3, ge=1, le=10)
     length: float = key("of the largest features", 0.5, "heights", gt=0, le=10)
     gain: float = key("speed of an octave over that of the one before", 0.6, ge=0, le=2)
@@ -139,7 +154,7 @@ class AnalyticMotion(Table):
     """L by formula, steady, free of divergence."""
 
     kind: Literal["analytic"] = key("a formula")
-    size: Cells2 = key("columns and rows of L", (64, 64), "cells")
+    size: Grid = grid("columns and rows of L", (64, 64))
     flow: Literal["constant", "diagonal", "rotation", "shear", "saddle", "vortex-pair"] = key("its form", "constant")
     speed: float = key("largest", 1.0, "cells of L per frame", gt=0, le=100)
     angle: float = key("turns the whole pattern", 0.0, "degrees", ge=-360, le=360)
@@ -149,21 +164,75 @@ class FileMotion(Table):
     """L from a file."""
 
     kind: Literal["file"] = key("a field, the same in every frame")
-    file: Asset = key("EXR (channels x, y) or VDB (grid vel, its middle slice), world units per second")
+    file: Asset = key("EXR (channels x, y) or VDB (grid vel; its middle slice, in 3-D all of it), world units per "
+                      "second; it is moved onto the domain")
+
+
+class Direction(Table):
+    """Where the local z axis faces at a point, placed by hand and interpolated over the domain (§3.3, [Turk 2001])."""
+
+    at: Vector = key("(x, y, z)", ..., "heights", min_length=3, max_length=3)
+    vector: Vector = key("(x, y, z), of any length", ..., min_length=3, max_length=3)
+
+
+def _neighborhoods(table: dict[str, Any]) -> tuple[int, ...]:
+    return (9,) if len(table.get("size", ())) == 3 else (17, 9)
 
 
 class Detail(Table):
-    """The synthesis of H (§3.1, 3.3, 3.4, 3.7)."""
+    """The synthesis of H (§3.1 to 3.4, 3.7)."""
 
-    size: Cells2 = key("columns and rows of H and F", (256, 256), "cells")
+    size: Grid = grid("columns and rows of H and F", (256, 256))
     levels: Annotated[int, Field(ge=1, le=10)] | Literal["auto"] = key(
         "of the image pyramid; \"auto\" brings the exemplar down to 8 cells", "auto")
     neighborhoods: Annotated[tuple[Width, ...], Strict(False)] = key(
-        "widths, odd, in the order used (§4: 17² followed by 9²)", (17, 9), "cells", min_length=1, max_length=4)
+        "widths, odd, in the order used (§4: 17² followed by 9²; 9² in 3-D)", _neighborhoods, "cells",
+        min_length=1, max_length=4)
     iterations: int = key("of search and assignment with each width (§4: 3 to 5)", 4, ge=1, le=50)
     search: Literal["exact", "k-coherence"] = key("exact, or k-coherence (§3.7)", "exact")
     k: int = key("candidates of k-coherence", 4, ge=1, le=32)
     along: Literal["x", "y"] = key("the exemplar's axis that follows L (§3.3); \"y\": upright motifs rise upright", "x")
+    facing: Literal["camera", "density", "directions"] = key(
+        "in 3-D, what the local z axis faces (§3.3): the front, out of the smoke that L carries, or what "
+        "[[detail.directions]] say", "camera")
+    directions: Annotated[tuple[Direction, ...], Strict(False)] = key(
+        "an array of tables [[detail.directions]], for facing = \"directions\"", (), max_length=256)
+
+
+PLANES = {"front": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "side": ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+          "top": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))}
+"""The planes of views: the exemplar's x and y axis in the local frame."""
+
+
+class View(Table):
+    """One of the views of 2-D exemplars that make a 3-D H (§3.2). It stands in the local frame, whose x axis (or y:
+    detail.along) follows L and whose z axis faces what detail.facing says; it fixes the components of H in its plane.
+    Without [[views]] the exemplar is seen from the front, the side and the top. Cells of all exemplars are cells of H:
+    their sizes may differ, up to four times. A VDB as exemplar (kind "field") is a view of all three components."""
+
+    plane: Literal["front", "side", "top"] | None = key(
+        "that the exemplar's x and y axis lie in: front x, y; side z, y; top x, z", None)
+    right: Vector | None = key("the exemplar's x axis in the local frame, instead of a plane", None, min_length=3,
+                               max_length=3)
+    up: Vector | None = key("its y axis, made perpendicular to right", None, min_length=3, max_length=3)
+    weight: float = key("of its matches beside those of the other views (§4)", 1.0, gt=0, le=1000)
+    exemplar: Annotated[Exemplar, Field(discriminator="kind")] | None = key(
+        "its own, a table with the keys of [exemplar]; none: that one", None)
+
+    @property
+    def axes(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Right and up, as they are written."""
+        return PLANES[self.plane] if self.plane else (self.right or (), self.up or ())
+
+
+    @property
+    def solid(self) -> bool:
+        """Whether its exemplar is a volume, which fixes all components."""
+        return _solid(self.exemplar)
+
+
+def _solid(exemplar: Exemplar | None) -> bool:
+    return isinstance(exemplar, FieldExemplar) and exemplar.solid
 
 
 class Combine(Table):
@@ -258,6 +327,7 @@ class Figure(Table):
     panels: Annotated[tuple[Panel, ...], Strict(False)] = key("from left to right", ("result",), min_length=1)
     labels: Annotated[tuple[str, ...], Strict(False)] = key(
         "below the panels, *italics* between asterisks; none: their usual ones", ())
+    plane: Literal["front", "side", "top"] = key("of the middle slice that panels of 3-D fields show", "front")
     columns: int = key("panels in a row; 0: all", 0, ge=0, le=64)
     panel: int = key("width of a panel", 512, "pixels", ge=16, le=LARGEST)
     frame: int = key("the frame the still shows; 0: the last", 0, ge=0, le=100000)
@@ -274,8 +344,27 @@ class Scene(Table):
     fps: float = key("speed of the animation", 30, "frames per second", gt=0, le=1000)
     exemplar: Exemplar = Field(discriminator="kind")
     coarse: SmokeMotion | NoiseMotion | AnalyticMotion | FileMotion = Field(discriminator="kind")
+    views: Annotated[tuple[View, ...], Strict(False)] = key(
+        "in 3-D, an array of tables [[views]]; none: front, side and top of [exemplar]", (), max_length=16)
     detail: Detail = Detail()
     combine: Combine
     density: Density = Density()
     render: LitRender | InkRender | VolumeRender | NoRender = Field(discriminator="kind")
     figure: Figure = Figure()
+
+    @property
+    def dimension(self) -> int:
+        """Of the fields: 2 or 3."""
+        return len(self.detail.size)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Cells of H and F as arrays count them, (Y, X) or (Z, Y, X)."""
+        return self.detail.size[::-1]
+
+    @property
+    def seen(self) -> tuple[View, ...]:
+        """The views of a 3-D scene, each with its exemplar."""
+        planes: tuple[Any, ...] = ("front",) if _solid(self.exemplar) else ("front", "side", "top")
+        views = self.views or tuple(View(plane=plane) for plane in planes)
+        return tuple(view if view.exemplar else view.model_copy(update={"exemplar": self.exemplar}) for view in views)

@@ -76,7 +76,16 @@ def test_quick_overrides_apply_only_when_asked_for(tmp_path: Path) -> None:
     ("omega = 1.5", "omega = -1", "combine.omega: should be greater than or equal to 0, not -1"),
     ("size = [32, 32]", "size = [32, 32.5]", "detail.size[1]: should be a valid integer, not 32.5"),
     ("size = [32, 32]", "size = 32", "detail.size: should be an array, not 32"),
-    ("size = [32, 32]", "size = [32, 32, 32]", "detail.size: should have at most 2 items, not 3"),
+    ("size = [32, 32]", "size = [32, 32, 32, 32]", "detail.size: should have at most 3 items, not 4"),
+    ("size = [32, 32]", "size = [32, 32, 32]", "coarse.size: 16×16 has not as many axes as detail.size, 32×32×32"),
+    ("[render]", "[[views]]\nplane = 'top'\n[render]", "views: needs a field in space; detail.size is 32×32"),
+    ("[render]", "[[views]]\nplan = 'top'\n[render]", "views[0].plan: unknown key; did you mean plane?"),
+    ("size = [32, 32]", "size = [32, 32]\nfacing = 'density'", "detail.facing: needs a field in space"),
+    ("size = [32, 32]", "facing = 'directions'", "detail.facing: needs a field in space"),
+    ("[render]", "[figure]\nplane = 'top'\n[render]", "figure.plane: needs a field in space"),
+    ("[render]", "[[density.sources]]\ncentre = [0.0, 0.1, 0.0]\n[render]",
+     "density.sources[0].centre: needs a field in space"),
+    ("[render]", "[[density.sources]]\nradius = 0.0\n[render]", "density.sources[0].radius[0]: should be greater"),
     ("size = [32, 32]", "size = [32, 100000]", "detail.size[1]: should be less than or equal to 4096, not 100000"),
     ("size = [32, 32]", "levels = 0", "detail.levels: "),
     ("size = [32, 32]", 'levels = "some"', "detail.levels: "),
@@ -98,6 +107,74 @@ def test_quick_overrides_apply_only_when_asked_for(tmp_path: Path) -> None:
 def test_what_is_wrong_is_named_in_one_line(tmp_path: Path, old: str, new: str, expected: str) -> None:
     assert old in GOOD
     assert complaint(written(tmp_path, GOOD.replace(old, new, 1))).startswith(expected)
+
+
+SOLID = """\
+title = "A small heart in space"
+frames = 2
+[exemplar]
+kind = "heart"
+size = 16
+[coarse]
+kind = "smoke"
+size = [8, 16, 8]
+[detail]
+size = [16, 32, 16]
+[combine]
+omega = 1.5
+[render]
+kind = "volume"
+VIEWS
+"""
+TOP, SIDE, OBLIQUE = ("[[views]]\n" + keys + "\n" for keys in (
+    'plane = "top"', 'plane = "side"', "right = [1.0, 1.0, 0.0]\nup = [0.0, 0.0, 1.0]"))
+
+
+@pytest.mark.parametrize("views", ["", TOP + SIDE, TOP + OBLIQUE, TOP + "weight = 3.0\n" + SIDE + (
+    'exemplar = { kind = "stripes", size = 8 }')])
+def test_a_good_scene_in_space(tmp_path: Path, views: str) -> None:
+    scene = load(written(tmp_path, SOLID.replace("VIEWS", views))).variants[""]
+    assert (scene.dimension, scene.shape) == (3, (16, 32, 16))
+    assert scene.detail.neighborhoods == (9,)
+    assert [view.exemplar.size for view in scene.seen] == ([16, 8] if "stripes" in views else [16] * len(scene.seen))
+    assert len(scene.seen) == (views.count("[[views]]") or 3)
+
+
+@pytest.mark.parametrize(("views", "expected"), [
+    (TOP, "views: do not span space: none of them shows y of the local frame"),
+    (TOP + TOP, "views: do not span space: none of them shows y of the local frame"),
+    ("[[views]]\nright = [1.0, 1.0, 0.0]\nup = [0.0, 0.0, 1.0]", "views: do not span space: none of them"),
+    (TOP + "[[views]]", "views[1]: needs a plane, or both right and up"),
+    (TOP + "[[views]]\nup = [0.0, 1.0, 0.0]", "views[1]: needs a plane, or both right and up"),
+    (TOP + "[[views]]\nright = [0.0, 2.0, 0.0]\nup = [0.0, 1.0, 0.0]", "views[1].up: is parallel to right"),
+    (TOP + "[[views]]\nright = [0.0, 0.0, 0.0]\nup = [0.0, 1.0, 0.0]", "views[1].up: is parallel to right"),
+    (TOP + SIDE + "up = [0.0, 1.0, 0.0]", "views[1].plane: says what right and up say too: leave one out"),
+    (TOP + SIDE + 'exemplar = { kind = "heart", size = 24 }',
+     "views[1].exemplar.size: an exemplar of 24² is larger than the output (16×32×16) along an axis of its view"),
+    (TOP + SIDE + 'exemplar = { kind = "heart", sise = 24 }', "views[1].exemplar.sise: unknown key; did you mean"),
+    (TOP + SIDE + 'exemplar = { kind = "hart" }', "views[1].exemplar.kind: unknown kind 'hart'; did you mean heart?"),
+    (TOP + SIDE + "weight = 0.0", "views[1].weight: should be greater than 0, not 0.0"),
+    (TOP + SIDE + 'exemplar = { kind = "heart", size = 8 }\n[variants.a]\n"detail.levels" = 3',
+     'variants."a"."detail.levels": 3 levels bring an exemplar of 8² below 4 cells'),
+    ("[density]\ndepth = {}", "density.depth: gives a plane a body; detail.size is 16×32×16, which has one"),
+    ('[variants.a]\nrender = { kind = "lit" }', 'variants."a"."render".kind: "lit" draws smoke in a plane'),
+    ('[variants.a]\n"detail.size" = [16, 32, 8]', 'variants."a"."detail.size": 16×32×8 has not the shape of'),
+    ('[variants.a]\n"detail.facing" = "directions"', "variants.\"a\": detail.directions: is missing"),
+    ("[[detail.directions]]\nat = [0.0, 0.5, 0.0]\nvector = [0.0, 0.0, 1.0]",
+     'detail.directions: is not used with facing = "camera"'),
+    ('[variants.a]\n"detail.facing" = "directions"\n"detail.directions" = [{ at = [0.0, 0.5, 0.0], vector = '
+     '[0.0, 0.0, 0.0] }]', 'variants."a"."detail.directions"[0].vector: is zero: it faces nowhere'),
+])
+def test_what_is_wrong_in_space_is_named_in_one_line(tmp_path: Path, views: str, expected: str) -> None:
+    assert complaint(written(tmp_path, SOLID.replace("VIEWS", views))).startswith(expected)
+
+
+def test_exemplars_of_different_scale_are_refused(tmp_path: Path) -> None:
+    text = SOLID.replace("[8, 16, 8]", "[16, 16, 16]").replace("[16, 32, 16]", "[64, 64, 64]")
+    views = TOP + 'exemplar = { kind = "square", size = SIZE }\n' + SIDE + 'exemplar = { kind = "stripes", size = 8 }'
+    load(written(tmp_path, text.replace("VIEWS", views).replace("SIZE", "32")))
+    assert complaint(written(tmp_path, text.replace("VIEWS", views).replace("SIZE", "48"))) == (
+        "views[0].exemplar.size: an exemplar of 48² beside one of 8²: at most 4 times as large")
 
 
 @pytest.mark.parametrize(("line", "expected"), [

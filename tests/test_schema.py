@@ -28,11 +28,12 @@ def branches(annotation: object) -> list[type[BaseModel]]:
 
 
 def tables(model: type[BaseModel] = schema.Scene, path: str = "") -> list[tuple[str, type[BaseModel]]]:
-    """(dotted path, table) of the schema, depth first."""
+    """(dotted path, table) of the schema, depth first, each table once."""
     found = [(path, model)]
     for name, field in model.model_fields.items():
         for table in branches(field.annotation):
-            found += tables(table, f"{path}.{name}" if path else name)
+            found += [(at, one) for at, one in tables(table, f"{path}.{name}" if path else name)
+                      if one not in [known for _, known in found]]
     return found
 
 
@@ -60,7 +61,8 @@ def spelled(annotation: object, metadata: object = ()) -> str:
     if origin is tuple:
         shortest = next((m.min_length for m in metadata if isinstance(m, MinLen)), 0)
         longest = next((m.max_length for m in metadata if isinstance(m, MaxLen)), "any")
-        count = f"{shortest} to {longest}" if parts[-1] is Ellipsis else f"{len(parts)}"
+        count = f"{shortest} to {longest}" if shortest != longest else f"{shortest}"
+        count = count if parts[-1] is Ellipsis else f"{len(parts)}"
         return f"array of {count}: {spelled(parts[0])}"
     name = {int: "integer", float: "number", str: "text", bool: "true or false", Path: "file"}.get(annotation, "table")
     return f"{name} {limits(metadata)}".strip()
@@ -69,12 +71,20 @@ def spelled(annotation: object, metadata: object = ()) -> str:
 def default(field: FieldInfo) -> str:
     """What a key is if it is left out."""
     value = field.default
+    if field.default_factory:
+        flat, deep = (field.default_factory({"size": size}) for size in ((8, 8), (8, 8, 8)))
+        return f"{spelled_value(flat)}, in 3-D {spelled_value(deep)}"
     if value is PydanticUndefined:
         return "needed"
     if value is None:
         return "none"
     if isinstance(value, BaseModel) or (isinstance(value, tuple) and value and isinstance(value[0], BaseModel)):
         return "as below"
+    return spelled_value(value)
+
+
+def spelled_value(value: object) -> str:
+    """A value as one writes it in a scene."""
     text = {True: "true", False: "false"}.get(value) if isinstance(value, bool) else None
     if isinstance(value, str):
         text = f'"{value}"'
