@@ -12,6 +12,7 @@ from synth.motion.assignment import (
     carry_reference,
     catmull_rom,
     falloff,
+    robust_weights,
     robust_weights_reference,
     sample_reference,
 )
@@ -42,7 +43,7 @@ def averaged(exemplar, position, weight, axis, grid, radius, step, prior, cohere
 
 @pytest.mark.parametrize("weights", [
     robust_weights_reference,
-    lambda squared, *given: Assigner(field((4, 4)), 4, 2).weights(opencl.to_device(squared), *given).get(),
+    lambda squared, *given: robust_weights(opencl.to_device(squared), *given).get(),
 ], ids=["reference", "kernel"])
 def test_robust_weights_are_one_for_an_exact_match_and_fall_with_distance(weights):
     found = weights(np.float32([0, 1, 10, 100, 1e5, 1e8]), 100, 0.5)
@@ -54,7 +55,7 @@ def test_robust_weights_are_one_for_an_exact_match_and_fall_with_distance(weight
 
 def test_robust_weights_equal_their_reference():
     squared = np.random.default_rng(0).exponential(30, 77).astype(np.float32)
-    ours = Assigner(field((4, 4)), 4, 2).weights(opencl.to_device(squared), 162, 0.4).get()
+    ours = robust_weights(opencl.to_device(squared), 162, 0.4).get()
     np.testing.assert_allclose(ours, robust_weights_reference(squared, 162, 0.4), rtol=1e-6)
 
 

@@ -17,10 +17,12 @@ ROBUST = 0.8
 EXACT = 0.05
 # the weight of a match falls to this at the middle of its edges, so that no seam stands where it ends
 EDGE = 0.1
+# cells of Catmull-Rom's weights beyond a point
+CARRY_BORDER = 2
 
 
 def robust_weights_reference(squared: np.ndarray, length: int, rms: float) -> np.ndarray:
-    """Specification of `Assigner.weights`; arguments as there."""
+    """Specification of `robust_weights`; arguments as there."""
     floor = length * (EXACT * rms) ** 2
     return ((1 + squared / floor) ** (ROBUST / 2 - 1)).astype(np.float32)
 
@@ -77,6 +79,23 @@ def carry_reference(field: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     return sample_reference(field, at.reshape(-1, 2), toroidal=False).reshape(field.shape)
 
 
+def robust_weights(squared: Any, length: int, rms: float) -> Any:
+    """Weights (S,) in (0, 1] of matches at squared distances (S,) over `length` numbers; one for an exact match.
+
+    rms is the exemplar's. Device array in, device array out.
+    """
+    weight = opencl.empty(squared.shape)
+    _bare().robust(squared.shape, None, squared, np.float32(1 / (length * (EXACT * rms) ** 2)),
+                   np.float32(ROBUST / 2 - 1), weight)
+    return weight
+
+
+def _bare() -> Any:
+    """The program for what has no neighbourhoods."""
+    return opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=0, SPACING=1, FIRST=0, REACH=0,
+                          BORDER=CARRY_BORDER)
+
+
 @dataclass(frozen=True)
 class Assigner:
     """Lays matches in an exemplar (N, M, 2) with sites `spacing` apart over the output."""
@@ -110,16 +129,6 @@ class Assigner:
         away = np.arange(self._reach + 1)
         return opencl.to_device(np.exp(-falloff(self.radius) * away**2).astype(np.float32))
 
-    def weights(self, squared: Any, length: int, rms: float) -> Any:
-        """Weights (S,) in (0, 1] of matches at squared distances (S,) over `length` numbers; one for an exact match.
-
-        rms is the exemplar's. Device array in, device array out.
-        """
-        weight = opencl.empty(squared.shape)
-        self._program.robust(squared.shape, None, squared, np.float32(1 / (length * (EXACT * rms) ** 2)),
-                             np.float32(ROBUST / 2 - 1), weight)
-        return weight
-
     def average(self, position: Any, weight: Any, axis: Any, grid: tuple[int, int], prior: Any, coherence: Any) -> Any:
         """Least squares (Eq. 1), cell by cell: the minimum over x of sum_p w_p |x_p - z_p|^2 + O(x).
 
@@ -139,10 +148,9 @@ def carry(field: np.ndarray, displacement: np.ndarray) -> np.ndarray:
 
     Catmull-Rom, clamped at the border; displacement as `synth.advect.departure` gives it.
     """
-    border = 2
-    program = opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=0, SPACING=1, FIRST=0, REACH=0, BORDER=border)
+    border = CARRY_BORDER
     out = opencl.empty(field.shape)
     padded = np.pad(field, ((border, border), (border, border), (0, 0)), mode="edge")
-    program.carry(field.shape[1::-1], None, opencl.to_device(padded), np.int32(padded.shape[1]),
+    _bare().carry(field.shape[1::-1], None, opencl.to_device(padded), np.int32(padded.shape[1]),
                   opencl.to_device(displacement), out)
     return out.get()

@@ -98,7 +98,7 @@ class Level:
                     z, squared = matcher.exact(queries)
                 else:
                     z, squared = matcher.coherent(queries, sites, axis, grid, z)
-                weights = assigner.weights(squared, matcher.space.length, self.rms)
+                weights = assignment.robust_weights(squared, matcher.space.length, self.rms)
                 x = assigner.average(matcher.refine(queries, z), weights, axis, grid, prior, hold)
         return x, squared
 
