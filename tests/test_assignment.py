@@ -21,19 +21,19 @@ from synth.motion.neighborhood import site_grid, spacing
 SHAPES = [(5, 7), (2, 2), (1, 9), (9, 1), (1, 1), (21, 26)]
 
 
-def field(shape, seed=0):
-    return np.random.default_rng(seed).normal(size=(*shape, 2)).astype(np.float32)
+def field(shape, seed=0, channels=2):
+    return np.random.default_rng(seed).normal(size=(*shape, channels)).astype(np.float32)
 
 
-def case(shape, radius, size, seed=0):
+def case(shape, radius, size, seed=0, channels=2):
     """Arguments of `average_reference`: random matches, weights, axes, prior and hold."""
     rng = np.random.default_rng(seed)
     sites, grid = site_grid(shape, 2 * radius + 1)
     angle = rng.uniform(-np.pi, np.pi, len(sites))
     position = rng.uniform(-0.5, np.array(size[::-1]) - 0.5, (len(sites), 2)).astype(np.float32)
-    return (field(size, seed + 1), position, rng.uniform(0.1, 1, len(sites)).astype(np.float32),
+    return (field(size, seed + 1, channels), position, rng.uniform(0.1, 1, len(sites)).astype(np.float32),
             np.stack([np.cos(angle), np.sin(angle)], -1).astype(np.float32), grid, radius, spacing(2 * radius + 1),
-            field(shape, seed + 2), rng.uniform(0, 3, shape).astype(np.float32))
+            field(shape, seed + 2, channels), rng.uniform(0, 3, shape).astype(np.float32))
 
 
 def averaged(exemplar, position, weight, axis, grid, radius, step, prior, coherence):
@@ -81,8 +81,9 @@ def test_sampling_at_cells_is_exact_and_wraps_or_repeats():
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("radius", [1, 4, 8])
 @pytest.mark.parametrize("size", [(5, 7), (2, 2), (16, 16)])
-def test_average_equals_its_reference(shape, radius, size):
-    given = case(shape, radius, size)
+@pytest.mark.parametrize("channels", [1, 2])
+def test_average_equals_its_reference(shape, radius, size, channels):
+    given = case(shape, radius, size, channels=channels)
     np.testing.assert_allclose(averaged(*given), average_reference(*given), atol=2e-5)
 
 
@@ -139,8 +140,9 @@ def test_whole_cells_are_carried_exactly():
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_carry_equals_its_reference(shape):
-    values, displacement = field(shape), 3 * field(shape, 1)
+@pytest.mark.parametrize("channels", [1, 2])
+def test_carry_equals_its_reference(shape, channels):
+    values, displacement = field(shape, channels=channels), 3 * field(shape, 1)
     np.testing.assert_allclose(carry(values, displacement), carry_reference(values, displacement), atol=1e-5)
 
 

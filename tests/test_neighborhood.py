@@ -19,8 +19,8 @@ from synth.motion.neighborhood import (
 SHAPES = [(5, 7), (2, 2), (1, 9), (9, 1), (1, 1), (24, 31)]
 
 
-def field(shape, seed=0):
-    return np.random.default_rng(seed).normal(size=(*shape, 2)).astype(np.float32)
+def field(shape, seed=0, channels=2):
+    return np.random.default_rng(seed).normal(size=(*shape, channels)).astype(np.float32)
 
 
 def turning(shape, seed=1):
@@ -74,10 +74,12 @@ def test_exemplar_patches_are_its_toroidal_windows():
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("radius", [1, 4, 8])
-def test_gather_equals_its_reference(shape, radius):
-    values, frame = field(shape), turning(shape)
+@pytest.mark.parametrize("channels", [1, 2])
+def test_gather_equals_its_reference(shape, radius, channels):
+    values, frame = field(shape, channels=channels), turning(shape)
     sites, _ = site_grid(shape, 3)
-    ours = space(field((6, 5)), radius)
+    ours = space(field((6, 5), channels=channels), radius)
+    assert ours.channels == channels
     expected = gather_reference(values, sites, frame[sites[:, 1], sites[:, 0]], radius)
     np.testing.assert_allclose(gathered(ours, values, frame, sites), expected, atol=2e-5)
 
@@ -102,10 +104,10 @@ def test_along_y_a_neighbourhood_is_the_window_turned():
 
 
 @pytest.mark.parametrize("size", [(5, 7), (16, 16)])
-@pytest.mark.parametrize("radius", [2, 8])
-def test_project_equals_its_reference(size, radius):
-    ours = space(field(size), radius)
-    values, frame = field((13, 11), 2), turning((13, 11))
+@pytest.mark.parametrize(("radius", "channels"), [(2, 1), (2, 2), (8, 2)])
+def test_project_equals_its_reference(size, radius, channels):
+    ours = space(field(size, channels=channels), radius)
+    values, frame = field((13, 11), 2, channels), turning((13, 11))
     for sites in (site_grid((13, 11), 9)[0], np.array([[3, 4]], np.int32)):
         patches = gather_reference(values, sites, frame[sites[:, 1], sites[:, 0]], radius)
         expected = ours.project_reference(patches)

@@ -5,6 +5,7 @@
 // -D FIRST    position of the first site
 // -D REACH    cells from its centre to its corner, rounded up
 // -D BORDER   cells by which the exemplar was continued toroidally on each side
+// -D CHANNELS of the fields: 2, vectors, or 1, their potential
 
 #include "motion/sample.h"
 
@@ -17,15 +18,15 @@ __kernel void robust(__global const float *squared, float scale, float exponent,
 // exemplar continued by BORDER; position (S) where a site's match lies in it; weight (S); axis (S), the frame at
 // the sites; falloff: factors of a match's weight at 0, 1, 2... cells from its centre along one axis; prior
 // (Y, X): the frame before, warped.
-__kernel void average(__global const float2 *exemplar, int pitch, __global const float *falloff,
+__kernel void average(__global const cell *exemplar, int pitch, __global const float *falloff,
                       __global const float2 *position, __global const float *weight, __global const float2 *axis,
-                      int2 grid, __global const float2 *prior, __global const float *coherence,
-                      __global float2 *out) {
+                      int2 grid, __global const cell *prior, __global const float *coherence,
+                      __global cell *out) {
     const int x = get_global_id(0), y = get_global_id(1), width = get_global_size(0);
     // the sites whose neighbourhoods, however turned, may reach here lie in a circle
     const int bottom = max(0, y - REACH - FIRST + SPACING - 1) / SPACING;
     const int top = min(grid.y - 1, (y + REACH - FIRST) / SPACING);
-    float8 sum = (float8)(0.0f);
+    cells4 sum = (cells4)(0.0f);
     float total = 0.0f;
     for (int gy = bottom; gy <= top; gy++) {
         const int way_y = y - (gy * SPACING + FIRST);
@@ -42,15 +43,15 @@ __kernel void average(__global const float2 *exemplar, int pitch, __global const
             total += w;
         }
     }
-    const float2 before = prior[y * width + x];
+    const cell before = prior[y * width + x];
     const float hold = coherence[y * width + x];
     out[y * width + x] = total > 0.0f ? (added(sum) / total + hold * before) / (1.0f + hold) : before;
 }
 
 // The frame before, carried by the flow: field continued by BORDER, displacement (Y, X) to where each cell's
 // content comes from. Linear interpolation, a little every frame, would wear the detail down.
-__kernel void carry(__global const float2 *field, int pitch, __global const float2 *displacement,
-                    __global float2 *out) {
+__kernel void carry(__global const cell *field, int pitch, __global const float2 *displacement,
+                    __global cell *out) {
     const int x = get_global_id(0), y = get_global_id(1), width = get_global_size(0);
     const float2 last = (float2)(width - 1, get_global_size(1) - 1);
     const float2 at = clamp((float2)(x, y) + displacement[y * width + x], (float2)(0.0f), last);

@@ -40,7 +40,7 @@ def catmull_rom(t: np.ndarray) -> np.ndarray:
 
 
 def sample_reference(field: np.ndarray, at: np.ndarray, toroidal: bool) -> np.ndarray:
-    """Specification of `sample`: Catmull-Rom of field (N, M, 2) at points (P, 2) as x, y; edges wrap or repeat."""
+    """Specification of `sample`: Catmull-Rom of field (N, M, K) at points (P, 2) as x, y; edges wrap or repeat."""
     low = np.floor(at).astype(int)
     weights = catmull_rom((at - low).astype(np.float32))
     index = low[:, :, None] + np.arange(-1, 3)
@@ -85,20 +85,20 @@ def robust_weights(squared: Any, length: int, rms: float) -> Any:
     rms is the exemplar's. Device array in, device array out.
     """
     weight = opencl.empty(squared.shape)
-    _bare().robust(squared.shape, None, squared, np.float32(1 / (length * (EXACT * rms) ** 2)),
+    _bare(1).robust(squared.shape, None, squared, np.float32(1 / (length * (EXACT * rms) ** 2)),
                    np.float32(ROBUST / 2 - 1), weight)
     return weight
 
 
-def _bare() -> Any:
+def _bare(channels: int) -> Any:
     """The program for what has no neighbourhoods."""
     return opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=0, SPACING=1, FIRST=0, REACH=0,
-                          BORDER=CARRY_BORDER)
+                          BORDER=CARRY_BORDER, CHANNELS=channels)
 
 
 @dataclass(frozen=True)
 class Assigner:
-    """Lays matches in an exemplar (N, M, 2) with sites `spacing` apart over the output."""
+    """Lays matches in an exemplar (N, M, K), K = 2 of a vector or 1 of a potential, with sites `spacing` apart over the output."""
 
     exemplar: np.ndarray
     radius: int
@@ -115,7 +115,8 @@ class Assigner:
     @cached_property
     def _program(self) -> Any:
         return opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=self.radius, SPACING=self.spacing,
-                              FIRST=self.spacing // 2, REACH=self._reach, BORDER=self._border)
+                              FIRST=self.spacing // 2, REACH=self._reach, BORDER=self._border,
+                              CHANNELS=self.exemplar.shape[2])
 
     @cached_property
     def _continued(self) -> tuple[Any, np.int32]:
@@ -134,8 +135,8 @@ class Assigner:
 
         O(x) = w |x - prior|^2 with w = coherence * (sum of w_p there), the frame coherence of [Kwatra 2005 §5].
         position (S, 2), where the matches' centres lie in the exemplar; weight (S,); axis (S, 2), the local x axis
-        of each site; grid (rows, columns) of sites; prior (Y, X, 2), coherence (Y, X). Device arrays in, device
-        array (Y, X, 2) out.
+        of each site; grid (rows, columns) of sites; prior (Y, X, K), coherence (Y, X). Device arrays in, device
+        array (Y, X, K) out.
         """
         out = opencl.empty(prior.shape)
         self._program.average(prior.shape[1::-1], None, *self._continued, self._falloff, position, weight, axis,
@@ -144,13 +145,13 @@ class Assigner:
 
 
 def carry(field: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-    """The frame before, moved by the flow (§3.4): field (Y, X, 2) at each cell + displacement (Y, X, 2) in cells.
+    """The frame before, moved by the flow (§3.4): field (Y, X, K) at each cell + displacement (Y, X, 2) in cells.
 
     Catmull-Rom, clamped at the border; displacement as `synth.advect.departure` gives it.
     """
     border = CARRY_BORDER
     out = opencl.empty(field.shape)
     padded = np.pad(field, ((border, border), (border, border), (0, 0)), mode="edge")
-    _bare().carry(field.shape[1::-1], None, opencl.to_device(padded), np.int32(padded.shape[1]),
+    _bare(field.shape[2]).carry(field.shape[1::-1], None, opencl.to_device(padded), np.int32(padded.shape[1]),
                   opencl.to_device(displacement), out)
     return out.get()

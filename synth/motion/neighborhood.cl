@@ -2,23 +2,30 @@
 // -D RADIUS  half width r of the neighbourhood, (2r+1)^2 samples
 // -D DIMS    number of PCA dimensions kept, a multiple of 16
 // -D SITES   neighbourhoods a work-item projects together
+// -D CHANNELS  of the field: 2, a vector, or 1, its potential
 
 #define SIDE (2 * RADIUS + 1)
-#define LENGTH (2 * SIDE * SIDE)
+#define LENGTH (CHANNELS * SIDE * SIDE)
 
-inline float2 bilinear_clamped(__global const float2 *field, int2 size, float2 at) {
+#if CHANNELS == 1
+typedef float cell;
+#else
+typedef float2 cell;
+#endif
+
+inline cell bilinear_clamped(__global const cell *field, int2 size, float2 at) {
     at = clamp(at, (float2)(0.0f), convert_float2(size - 1));
     const int2 low = min(convert_int2(at), max(size - 2, (int2)(0)));
     const int2 high = min(low + 1, size - 1);
     const float2 t = at - convert_float2(low);
-    const float2 a = (1.0f - t.x) * field[low.y * size.x + low.x] + t.x * field[low.y * size.x + high.x];
-    const float2 b = (1.0f - t.x) * field[high.y * size.x + low.x] + t.x * field[high.y * size.x + high.x];
+    const cell a = (1.0f - t.x) * field[low.y * size.x + low.x] + t.x * field[low.y * size.x + high.x];
+    const cell b = (1.0f - t.x) * field[high.y * size.x + low.x] + t.x * field[high.y * size.x + high.x];
     return (1.0f - t.y) * a + t.y * b;
 }
 
-// field (Y, X) float2; sites (S) int2; axis (S) float2, the local x axis there -> out (S, SIDE, SIDE) float2
-__kernel void gather(__global const float2 *field, int2 size, __global const int2 *sites,
-                     __global const float2 *axis, __global float2 *out) {
+// field (Y, X) cell; sites (S) int2; axis (S) float2, the local x axis there -> out (S, SIDE, SIDE) cell
+__kernel void gather(__global const cell *field, int2 size, __global const int2 *sites,
+                     __global const float2 *axis, __global cell *out) {
     const int s = get_global_id(0);
     const float2 centre = convert_float2(sites[s]), e = axis[s];
     for (int j = -RADIUS; j <= RADIUS; j++)

@@ -37,7 +37,7 @@ def site_grid(shape: tuple[int, int], width: int) -> tuple[np.ndarray, tuple[int
 
 
 def exemplar_patches(exemplar: np.ndarray, radius: int) -> np.ndarray:
-    """All toroidal neighbourhoods of an exemplar (N, M, 2): (N * M, (2r+1)^2 * 2) float32, row by row."""
+    """All toroidal neighbourhoods of an exemplar (N, M, K): (N * M, (2r+1)^2 * K) float32, row by row."""
     rows, columns = exemplar.shape[:2]
     padded = np.pad(exemplar, ((radius, radius), (radius, radius), (0, 0)), mode="wrap")
     windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * radius + 1, 2 * radius + 1), axis=(0, 1))
@@ -47,7 +47,7 @@ def exemplar_patches(exemplar: np.ndarray, radius: int) -> np.ndarray:
 def gather_reference(field: np.ndarray, sites: np.ndarray, axis: np.ndarray, radius: int) -> np.ndarray:
     """Specification of the kernel `gather`: field sampled bilinearly, clamped, at site + R(axis) (i, j).
 
-    field (Y, X, 2) float32; sites (S, 2) int32 as x, y; axis (S, 2) float32 -> (S, (2r+1)^2 * 2) float32.
+    field (Y, X, K) float32; sites (S, 2) int32 as x, y; axis (S, 2) float32 -> (S, (2r+1)^2 * K) float32.
     """
     span = np.arange(-radius, radius + 1, dtype=np.float32)
     j, i = np.meshgrid(span, span, indexing="ij")
@@ -67,7 +67,7 @@ def gather_reference(field: np.ndarray, sites: np.ndarray, axis: np.ndarray, rad
 class Space:
     """The PCA space of an exemplar's neighbourhoods of one radius.
 
-    mean (C,), basis (C, D) with C = (2r+1)^2 * 2 and D a multiple of 16 (zero columns fill it up);
+    mean (C,), basis (C, D) with C = (2r+1)^2 * K, K the channels (2 of a vector, 1 of a potential), and D a multiple of 16 (zero columns fill it up);
     points (N * M, D): the exemplar's own neighbourhoods in it. All float32.
     """
 
@@ -85,10 +85,15 @@ class Space:
         """C, the numbers in one neighbourhood."""
         return self.basis.shape[0]
 
+    @property
+    def channels(self) -> int:
+        """K, the numbers in one cell."""
+        return self.length // (2 * self.radius + 1) ** 2
+
     @cached_property
     def _program(self) -> Any:
         return opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=self.radius, DIMS=self.dims,
-                              SITES=SITES_TOGETHER)
+                              SITES=SITES_TOGETHER, CHANNELS=self.channels)
 
     @cached_property
     def _basis_and_mean(self) -> tuple[Any, Any]:
@@ -97,13 +102,13 @@ class Space:
         return opencl.to_device(self.basis), opencl.to_device(mean.astype(np.float32))
 
     def gather(self, field: Any, sites: Any, axis: Any) -> Any:
-        """Oriented neighbourhoods of field (Y, X, 2) at sites (S, 2) int32, their x axes along axis (S, 2).
+        """Oriented neighbourhoods of field (Y, X, K) at sites (S, 2) int32, their x axes along axis (S, 2).
 
         Device arrays in, device array (S, C) out, as `gather_reference`; rows are added to make them a multiple
         of SITES_TOGETHER, and hold nothing of meaning.
         """
-        count, samples = sites.shape[0], (2 * self.radius + 1) ** 2
-        patches = opencl.empty((-(-count // SITES_TOGETHER) * SITES_TOGETHER, 2 * samples))
+        count = sites.shape[0]
+        patches = opencl.empty((-(-count // SITES_TOGETHER) * SITES_TOGETHER, self.length))
         self._program.gather((count,), (1,), field, np.array(field.shape[1::-1], np.int32), sites, axis, patches)
         return patches
 
@@ -124,7 +129,7 @@ class Space:
 
 
 def space(exemplar: np.ndarray, radius: int) -> Space:
-    """Principal components of the toroidal neighbourhoods of exemplar (N, M, 2), ordered by variance."""
+    """Principal components of the toroidal neighbourhoods of exemplar (N, M, K), ordered by variance."""
     return space_of(exemplar_patches(exemplar, radius), radius)
 
 
