@@ -98,7 +98,7 @@ def _bare(channels: int) -> Any:
 
 @dataclass(frozen=True)
 class Assigner:
-    """Lays matches in an exemplar (N, M, K), K = 2 of a vector or 1 of a potential, with sites `spacing` apart over the output."""
+    """Lays matches in an exemplar (N, M, K), K = 2 (of a potential 1), with sites `spacing` apart over the output."""
 
     exemplar: np.ndarray
     radius: int

@@ -67,8 +67,8 @@ def gather_reference(field: np.ndarray, sites: np.ndarray, axis: np.ndarray, rad
 class Space:
     """The PCA space of an exemplar's neighbourhoods of one radius.
 
-    mean (C,), basis (C, D) with C = (2r+1)^2 * K, K the channels (2 of a vector, 1 of a potential), and D a multiple of 16 (zero columns fill it up);
-    points (N * M, D): the exemplar's own neighbourhoods in it. All float32.
+    mean (C,), basis (C, D) with C = (2r+1)^2 * K, K the channels (2 of a vector, 1 of a potential), and D a multiple
+    of 16 (zero columns fill it up); points (N * M, D): the exemplar's own neighbourhoods in it. All float32.
     """
 
     radius: int
