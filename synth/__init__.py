@@ -7,6 +7,8 @@ In the order data passes through them:
     advect      semi-Lagrangian advection [Stam 1999]
     projection  exact Helmholtz-Hodge projection
     noise       curl noise [Bridson et al. 2007]
+    obstacle    solids, as a signed distance field
+    wake        a river past a round stone [Bridson et al. 2007]
     smoke       a simulated plume [Stam 1999; Fedkiw et al. 2001]
     pyramid     image pyramids of fields
     motion/     motion field texture synthesis (ma09)

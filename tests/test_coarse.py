@@ -57,7 +57,7 @@ def test_every_kind_yields_its_frames(kind):
 
 
 def test_refusals_come_at_once():
-    with pytest.raises(ValueError, match="none of smoke, curl-noise, analytic"):
+    with pytest.raises(ValueError, match="none of smoke, curl-noise, wake, analytic"):
         coarse("fire", (8, 8), 1)
     with pytest.raises(ValueError, match=r"no setting 'bouyancy'; it has .*buoyancy"):
         coarse("smoke", (8, 8), 1, bouyancy=1.0)

@@ -9,6 +9,7 @@ In the order data passes through them:
     neighborhood  what is compared (§3.1, §3.3)
     search        the best match of each neighbourhood (§3.1, §3.7)
     assignment    least squares over the matches (§3.1)
+    boundary      E_n, the soft boundary condition (§3.6, Eq. 3)
     detail        all of these, level by level and frame by frame (pseudocode 1 and 2)
     quality       how good a synthesized field is
     combine       F = upsample(L) + omega H' (§3.5), and its projection (§3.6)
@@ -20,4 +21,5 @@ Notation, as in the paper:
     I  exemplar                L  coarse motion         H  detail, H' after the coordinate transformation
     F  final motion            omega  weight of H'      D  density, O  density under L alone
     m  window, in frames       x_p, z_p  output neighbourhood and its match      E_t  their energy
+    E_n  energy of the boundary, n its normal, b the motion given there, lambda its weight
 """

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from synth import noise, smoke
+from synth import noise, smoke, wake
 from synth.advect import velocity_field
 
 
@@ -19,6 +19,7 @@ def coarse(kind: str, shape: tuple[int, ...], frames: int, seed: int = 0,
 
     kind "smoke"       a rising plume; settings as `synth.smoke.simulate`
          "curl-noise"  a random divergence-free flow; settings as `synth.noise.curl_noise`
+         "wake"        a river past a round stone; settings as `synth.wake.wake`
          "analytic"    a steady flow; settings: flow (a key of FLOWS), speed (largest, cells per frame),
                        angle (degrees, turns the whole pattern)
     Yields (*shape, D) float32, cells per frame. Raises ValueError for an unknown kind or setting, at once.
@@ -82,7 +83,7 @@ def _analytic(shape: tuple[int, ...], frames: int, *, seed: int = 0, flow: str =
 
 
 KINDS: dict[str, Callable[..., Iterator[np.ndarray]]] = {
-    "smoke": _smoke, "curl-noise": noise.curl_noise, "analytic": _analytic}
+    "smoke": _smoke, "curl-noise": noise.curl_noise, "wake": wake.wake, "analytic": _analytic}
 """The kinds of coarse motion that `coarse` makes."""
 
 

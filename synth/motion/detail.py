@@ -20,6 +20,7 @@ from synth import opencl, pyramid
 from synth.advect import departure
 from synth.motion import assignment, initialize, neighborhood
 from synth.motion.assignment import Assigner
+from synth.motion.boundary import Constraint, walls
 from synth.motion.frames import local_frame
 from synth.motion.search import Matcher
 
@@ -76,12 +77,12 @@ class Level:
                 for width in self.settings.neighborhoods]
 
     def optimize(self, H: np.ndarray, frame: np.ndarray, iterations: int,
-                 coherence: np.ndarray | None = None) -> tuple[Any, Any]:
+                 coherence: np.ndarray | None = None, boundary: Constraint | None = None) -> tuple[Any, Any]:
         """Search and assign, `iterations` times with each width of neighbourhoods.
 
         H, frame (Y, X, 2); `coherence` (Y, X) holds the result to H as it came, the frame before, warped: the O(x)
-        of Eq. 1. Returns H (Y, X, 2) and the squared distances (S,) of its last matches, both still on the device,
-        which works on while this returns.
+        of Eq. 1; `boundary` is the E_n of Eq. 3. Returns H (Y, X, 2) and the squared distances (S,) of its last
+        matches, both still on the device, which works on while this returns.
         """
         if coherence is None:
             coherence = np.zeros(frame.shape[:2], np.float32)
@@ -100,6 +101,8 @@ class Level:
                     z, squared = matcher.coherent(queries, sites, axis, grid, z)
                 weights = assignment.robust_weights(squared, matcher.space.length, self.rms)
                 x = assigner.average(matcher.refine(queries, z), weights, axis, grid, prior, hold)
+                if boundary is not None:
+                    boundary.impose(x, hold)
         return x, squared
 
     def distance(self, squared: Any) -> float:
@@ -119,15 +122,18 @@ class State:
 class Synthesis:
     """Synthesizes H frame by frame.
 
-    exemplar (N, M, 2) float32; shape (Y, X) of the output.
+    exemplar (N, M, 2) float32; shape (Y, X) of the output; distance (Y, X) to the wall of an obstacle, cells, whose
+    boundary H is to observe (§3.6).
     """
 
-    def __init__(self, exemplar: np.ndarray, shape: tuple[int, int], settings: Settings, seed: int):
+    def __init__(self, exemplar: np.ndarray, shape: tuple[int, int], settings: Settings, seed: int,
+                 distance: np.ndarray | None = None):
         rms = float(np.sqrt(np.mean(exemplar.astype(np.float64) ** 2)))
         if rms == 0.0:
             raise ValueError("the exemplar is zero everywhere")
         self.levels = [Level(I, rms, settings) for I in pyramid.pyramid(exemplar, settings.levels, toroidal=True)]
         self.shape, self.seed, self.along = shape, seed, settings.along
+        self.walls = None if distance is None else walls(distance, settings.levels, MARGIN)
 
     def frame(self, L: np.ndarray, state: State | None) -> State:
         """The state after the frame with coarse motion L (Y, X, 2) cells per frame; None before the first."""
@@ -140,9 +146,10 @@ class Synthesis:
     def _first(self, frames: list[np.ndarray]) -> list[np.ndarray]:
         """H of each level of the first frame: the coarsest from a mosaic, each other from the one before."""
         done = [self._start(frames[0])]
-        for level, frame in zip(self.levels[1:], frames[1:], strict=True):
+        for i, (level, frame) in enumerate(zip(self.levels[1:], frames[1:], strict=True), start=1):
             H = initialize.reseed(_finer(done[-1], frame.shape[:2]), level.exemplar, frame)
-            done.append(level.optimize(H, frame, level.settings.iterations)[0].get())
+            done.append(level.optimize(H, frame, level.settings.iterations,
+                                       boundary=self._boundary(i, frame))[0].get())
         return done
 
     def _next(self, motions: list[np.ndarray], frames: list[np.ndarray], state: State) -> list[np.ndarray]:
@@ -156,8 +163,13 @@ class Synthesis:
                 H = H + _finer(done[-1] - warped[i - 1], H.shape[:2])
             H = initialize.reseed(H, level.exemplar, frames[i])
             bent = deformation(ways[i], state.frame[i], frames[i]) / DEFORMED
-            done.append(level.optimize(H, frames[i], level.settings.few, COHERENCE / (1 + bent**2))[0].get())
+            done.append(level.optimize(H, frames[i], level.settings.few, COHERENCE / (1 + bent**2),
+                                       self._boundary(i, frames[i]))[0].get())
         return done
+
+    def _boundary(self, level: int, frame: np.ndarray) -> Constraint | None:
+        """E_n of a level with these local frames."""
+        return None if self.walls is None else Constraint(self.walls[level], frame)
 
     def visible(self, state: State) -> np.ndarray:
         """H (Y, X, 2) of a state, without its margin."""
@@ -167,10 +179,11 @@ class Synthesis:
         """The coarsest level of the first frame: of several mosaics the one that promises most, optimized."""
         level = self.levels[0]
         rms = np.sqrt(np.mean(level.exemplar**2))
-        trials = []
+        trials, boundary = [], self._boundary(0, frame)
         for start in range(STARTS):  # the device optimizes one while the next is laid
             random = np.random.Generator(np.random.Philox(key=[self.seed, start]))
-            trials.append(level.optimize(initialize.mosaic(level.exemplar, frame, random), frame, level.settings.few))
+            trials.append(level.optimize(initialize.mosaic(level.exemplar, frame, random), frame, level.settings.few,
+                                         boundary=boundary))
         best, least = None, np.inf
         for optimized, squared in trials:
             H = optimized.get()
@@ -181,7 +194,7 @@ class Synthesis:
                 best, least = H, score
         assert best is not None
         best = initialize.reseed(best, level.exemplar, frame)
-        return level.optimize(best, frame, level.settings.iterations)[0].get()
+        return level.optimize(best, frame, level.settings.iterations, boundary=boundary)[0].get()
 
 
 def deformation(way: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -212,9 +225,9 @@ def _finer(H: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def synthesize(exemplar: np.ndarray, motion: Iterable[np.ndarray], shape: tuple[int, int], settings: Settings,
-               seed: int) -> Iterator[np.ndarray]:
+               seed: int, distance: np.ndarray | None = None) -> Iterator[np.ndarray]:
     """H (Y, X, 2) for each frame of coarse motion L (Y, X, 2), cells per frame at the output's resolution."""
-    synthesis = Synthesis(exemplar, shape, settings, seed)
+    synthesis = Synthesis(exemplar, shape, settings, seed, distance)
     state = None
     for L in motion:
         state = synthesis.frame(L, state)
