@@ -5,6 +5,7 @@ Renderers return linear Rec.709 light. Nothing is toned before this module, whic
 
 from __future__ import annotations
 
+import functools
 from typing import Literal
 
 import numpy as np
@@ -48,10 +49,15 @@ def eight_bit(display: np.ndarray, seed: int = 0) -> np.ndarray:
     still in an animation. Exact black and exact white stay exact.
     """
     display = np.clip(display, 0.0, 1.0)
-    rng = np.random.Generator(np.random.Philox(key=seed))
-    noise = rng.random(display.shape, dtype=np.float32) - rng.random(display.shape, dtype=np.float32)
-    noise[(display == 0.0) | (display == 1.0)] = 0.0
+    noise = np.where((display == 0.0) | (display == 1.0), np.float32(0.0), _triangular(display.shape, seed))
     return np.clip(np.rint(display * 255.0 + noise), 0, 255).astype(np.uint8)
+
+
+@functools.lru_cache(maxsize=8)  # the same in every frame
+def _triangular(shape: tuple[int, ...], seed: int) -> np.ndarray:
+    """Noise between -1 and 1, the difference of two uniform numbers."""
+    rng = np.random.Generator(np.random.Philox(key=seed))
+    return np.asarray(rng.random(shape, dtype=np.float32) - rng.random(shape, dtype=np.float32))
 
 
 def oklab_to_linear(oklab: np.ndarray) -> np.ndarray:

@@ -87,6 +87,7 @@ def _line_height(size: int) -> int:
     return round(1.4 * size)
 
 
+@functools.lru_cache(maxsize=256)  # the same in every frame
 def lettering(text: str, size: int) -> np.ndarray:
     """One line of text as coverage (h, w) float32 in [0, 1], `size` pixels to the em, cut to its own width.
 

@@ -6,17 +6,22 @@ Fields have y up (row 0 is the bottom); the pictures have their top row first.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, sparse
 
 from render import film
 
-OVERSAMPLING = 2  # lines are drawn on a grid this much finer and averaged down: no jagged streaks
+OVERSAMPLING = 2  # lines are finished on a grid this much finer and averaged down: no jagged streaks
 STREAK = 0.13  # length of the convolution kernel as a share of the picture's larger side
-GRAIN = 1.25  # size of a grain of the noise in pixels of the picture
+FINISH = 5  # length of the last, short kernel, on the finer grid
+GRAIN = 1.25  # size of a grain of the still noise in pixels of the picture
+THREAD = 0.5  # and of the noise that is convolved, which the passes and their sampling coarsen
 CONTRAST = 0.24  # standard deviation of integrated lines about mid grey
 STILL_CONTRAST = 0.055  # of the noise where the field is zero: the "reduced amplitude"
 STILL, MOVING = 0.004, 0.03  # magnitudes, as shares of the largest, between which lines fade in
+SPLINE_BORDER = 12  # cells after which a spline's coefficient has forgotten its neighbour, in float32
 
 
 def slice_of(v: np.ndarray, index: int | None = None) -> np.ndarray:
@@ -44,14 +49,35 @@ def resampled(values: np.ndarray, height: int, width: int, order: int = 1) -> np
 
     Cells are little squares: the borders of the two grids coincide, and border cells are extended.
     """
-    rows = (np.arange(height) + 0.5) * (values.shape[0] / height) - 0.5
-    columns = (np.arange(width) + 0.5) * (values.shape[1] / width) - 0.5
-    where = np.meshgrid(rows, columns, indexing="ij")
-    planes = values[..., None] if values.ndim == 2 else values
-    result = np.stack(
-        [ndimage.map_coordinates(planes[..., c], where, order=order, mode="nearest", output=np.float32)
-         for c in range(planes.shape[2])], axis=-1)
-    return result[..., 0] if values.ndim == 2 else result
+    rows, columns, *channels = values.shape
+    if order == 3:  # B-spline coefficients; what lies beyond the border is out of their reach
+        border = ((SPLINE_BORDER,) * 2, (SPLINE_BORDER,) * 2, *((0, 0) for _ in channels))
+        values = np.pad(values, border, mode="edge")
+        for axis in (0, 1):
+            values = ndimage.spline_filter1d(values, order, axis)
+    across = np.moveaxis(values, 1, 0).astype(np.float32)  # columns first, while the rows are few
+    across = (_weights(columns, width, order) @ across.reshape(len(across), -1)).reshape(width, *across.shape[1:])
+    along = np.ascontiguousarray(np.moveaxis(across, 0, 1))
+    result = _weights(rows, height, order) @ along.reshape(len(along), -1)
+    return np.asarray(result.reshape(height, width, *channels))
+
+
+def _weights(cells: int, pixels: int, order: int) -> sparse.csr_matrix:
+    """What each cell gives to each pixel along one axis, (pixels, cells) float32; order 3: cells and their border."""
+    at = (np.arange(pixels) + 0.5) * (cells / pixels) - 0.5
+    if order == 1:
+        at = np.clip(at, 0, cells - 1)
+    low = np.floor(at).astype(int)
+    t = at - low
+    if order == 1:
+        first, taps = low, np.stack([1 - t, t])
+    else:
+        first = low - 1 + SPLINE_BORDER
+        taps = np.stack([(1 - t)**3, (3 * t - 6) * t**2 + 4, ((3 - 3 * t) * t + 3) * t + 1, t**3]) / 6
+        cells += 2 * SPLINE_BORDER
+    column = np.minimum(first + np.arange(len(taps))[:, None], cells - 1)
+    row = np.broadcast_to(np.arange(pixels), column.shape)
+    return sparse.csr_matrix((taps.astype(np.float32).ravel(), (row.ravel(), column.ravel())), (pixels, cells))
 
 
 def averaged(values: np.ndarray, factor: int) -> np.ndarray:
@@ -60,11 +86,15 @@ def averaged(values: np.ndarray, factor: int) -> np.ndarray:
     return values.reshape(h, factor, w, factor, *values.shape[2:]).mean(axis=(1, 3))
 
 
-def _noise(height: int, width: int, seed: int) -> np.ndarray:
-    """Noise (height, width), positive, of deviation 1, its grain a little larger than an output pixel."""
-    white = np.random.Generator(np.random.Philox(key=seed)).standard_normal((height, width), dtype=np.float32)
-    soft = ndimage.gaussian_filter(white, GRAIN * OVERSAMPLING / 2.355, mode="wrap")
-    return (soft - soft.min()) / soft.std()  # positive: rlic refuses a texture below zero
+@functools.lru_cache(maxsize=4)  # the same in every frame
+def _noise(height: int, width: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Noise for a picture (height, width): what is convolved, positive; and what stays where nothing moves."""
+    fine = (height * OVERSAMPLING, width * OVERSAMPLING)
+    white = np.random.Generator(np.random.Philox(key=seed)).standard_normal(fine, dtype=np.float32)
+    still, threads = (
+        averaged(ndimage.gaussian_filter(white, grain * OVERSAMPLING / 2.355, mode="wrap"), OVERSAMPLING)
+        for grain in (GRAIN, THREAD))
+    return threads - threads.min(), still  # rlic refuses a texture below zero
 
 
 def _moving(magnitude: np.ndarray) -> np.ndarray:
@@ -79,22 +109,30 @@ def _moving(magnitude: np.ndarray) -> np.ndarray:
 def lines(v: np.ndarray, width: int, seed: int = 1) -> np.ndarray:
     """LIC of `v` (Y, X, 2), any unit, y up: grey display values (h, width) float32 in [0, 1], top row first.
 
-    Two passes over noise at twice the resolution, brought to one contrast; zero vectors keep dim noise.
+    Two long passes over white noise at the picture's own size make the streaks; a short third one at twice the
+    size, averaged down, takes their jags away. Brought to one contrast; zero vectors keep dim noise.
     """
+    v = _checked(v)
+    height = height_for(v.shape, width)
+    fine = resampled(v, height * OVERSAMPLING, width * OVERSAMPLING, order=3)
+    threads, still = _noise(height, width, seed)
+    length = int(STREAK * max(height, width)) // 4 * 2 + 1  # odd: as far forward as back; two passes
+    streaks = _convolved(threads, averaged(fine, OVERSAMPLING), length, 2)
+    finer = resampled(streaks, height * OVERSAMPLING, width * OVERSAMPLING)
+    streaks = averaged(_convolved(finer, fine, FINISH, 1), OVERSAMPLING)
+    moving = averaged(_moving(np.hypot(fine[..., 0], fine[..., 1])), OVERSAMPLING)
+    grey = 0.5 + moving * _contrast(streaks, moving, CONTRAST)
+    grey += (1.0 - moving) * _contrast(still, 1.0 - moving, STILL_CONTRAST)
+    return np.clip(grey, 0.0, 1.0)[::-1].astype(np.float32)
+
+
+def _convolved(texture: np.ndarray, v: np.ndarray, length: int, passes: int) -> np.ndarray:
+    """A positive texture (h, w) averaged along v (h, w, 2) under a Hann window of `length` pixels, `passes` times."""
     import rlic
 
-    v = _checked(v)
-    rows, columns = height_for(v.shape, width) * OVERSAMPLING, width * OVERSAMPLING
-    fine = resampled(v, rows, columns, order=3)
-    noise = _noise(rows, columns, seed)
-    length = int(STREAK * max(rows, columns)) // 4 * 2 + 1  # odd: as far forward as back; two passes
     kernel = np.hanning(length + 2)[1:-1].astype(np.float32)
-    streaks = rlic.convolve(noise, np.ascontiguousarray(fine[..., 0]), np.ascontiguousarray(fine[..., 1]),
-                            kernel=kernel / kernel.sum(), iterations=2)
-    moving = averaged(_moving(np.hypot(fine[..., 0], fine[..., 1])), OVERSAMPLING)
-    grey = 0.5 + moving * _contrast(averaged(streaks, OVERSAMPLING), moving, CONTRAST)
-    grey += (1.0 - moving) * _contrast(averaged(noise, OVERSAMPLING), 1.0 - moving, STILL_CONTRAST)
-    return np.clip(grey, 0.0, 1.0)[::-1].astype(np.float32)
+    return rlic.convolve(np.maximum(texture, 0), np.ascontiguousarray(v[..., 0]), np.ascontiguousarray(v[..., 1]),
+                         kernel=kernel / kernel.sum(), iterations=passes)
 
 
 def _contrast(values: np.ndarray, weight: np.ndarray, deviation: float) -> np.ndarray:
@@ -147,6 +185,7 @@ def picture(v: np.ndarray, width: int, seed: int = 1, tint: bool = False) -> np.
     return _hued(0.25 + 0.75 * grey, 0.15 * strength * room, np.arctan2(fine[..., 1], fine[..., 0]))
 
 
+@functools.lru_cache(maxsize=4)  # the same in every frame
 def wheel(size: int) -> np.ndarray:
     """The legend of `colour`: a disc (size, size, 4) float32 display values and coverage, top row first."""
     at = (np.arange(4 * size) + 0.5) / (2 * size) - 1.0

@@ -1,26 +1,27 @@
 /* Light through a sheet of smoke in layers: see sheet.py, whose NumPy functions these kernels must equal.
-   Sizes: WIDTH x HEIGHT pixels, x fastest, y up; LAYERS layers, each HEIGHT * WIDTH apart. */
+   Sizes: WIDTH x HEIGHT pixels, x fastest, y up; rows are PITCH apart, a multiple of 16 that is not a power of
+   two, and LAYERS layers LAYER apart: else rows and layers push each other out of the processor's cache. */
 
-#define HERE (y * WIDTH + x)
+#define HERE (y * PITCH + x)
+#define LAYER (HEIGHT * PITCH)
 
-/* Optical depth of each layer, front first, and the weight with which the eye sees it. */
+/* Optical depth of each layer, front first, and the weight with which the eye sees it; 16 pixels at a time. */
 kernel void split(global const float *depth, global const float *relief, global float *layers, global float *seen,
                   global float *passed) {
-    const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= WIDTH)
-        return;
-    const float half_thickness = relief[HERE], whole = depth[HERE];
-    float before = 1.0f, sum = 0.0f;
+    const int x = get_global_id(0) * 16, y = get_global_id(1);
+    const float16 half_thickness = vload16(0, relief + HERE), whole = vload16(0, depth + HERE);
+    float16 before = (float16)(1.0f), sum = (float16)(0.0f);
     for (int k = 0; k < LAYERS; k++) {
         const float z = fabs(2.0f * (k + 0.5f) / LAYERS - 1.0f);
-        const float layer = whole / LAYERS * clamp((half_thickness - z) * (LAYERS / SOFT_LAYERS) + 0.5f, 0.0f, 1.0f);
+        const float16 layer = whole / LAYERS * clamp((half_thickness - z) * (LAYERS / SOFT_LAYERS) + 0.5f,
+                                                     (float16)(0.0f), (float16)(1.0f));
         sum += layer;
-        const float after = exp(-sum);
-        layers[k * HEIGHT * WIDTH + HERE] = layer;
-        seen[k * HEIGHT * WIDTH + HERE] = before - after;
+        const float16 after = exp(-sum);
+        vstore16(layer, 0, layers + k * LAYER + HERE);
+        vstore16(before - after, 0, seen + k * LAYER + HERE);
         before = after;
     }
-    passed[HERE] = before;
+    vstore16(before, 0, passed + HERE);
 }
 
 #define INSIDE ((y + PAD) * (WIDTH + 2 * PAD) + x + PAD)
@@ -39,9 +40,9 @@ kernel void traverse(global const float *layers, global const float *seen, globa
         + (first_in[high] * (1 - fx) + first_in[high + 1] * fx) * fy;
     const float deep = (deep_in[low] * (1 - fx) + deep_in[low + 1] * fx) * (1 - fy)
         + (deep_in[high] * (1 - fx) + deep_in[high + 1] * fx) * fy;
-    const float half_first = exp(-0.5f * slant * layers[k * HEIGHT * WIDTH + HERE]);
+    const float half_first = exp(-0.5f * slant * layers[k * LAYER + HERE]);
     const float half_deep = sqrt(sqrt(half_first));
-    total[HERE] += seen[k * HEIGHT * WIDTH + HERE] * (first * half_first + deep * half_deep);
+    total[HERE] += seen[k * LAYER + HERE] * (first * half_first + deep * half_deep);
     first_out[INSIDE] = first * half_first * half_first;
     deep_out[INSIDE] = deep * half_deep * half_deep;
 }
@@ -52,29 +53,34 @@ kernel void sink(global const float *layers, global const float *seen, global fl
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= WIDTH)
         return;
-    const float layer = layers[k * HEIGHT * WIDTH + HERE];
-    total[HERE] += seen[k * HEIGHT * WIDTH + HERE] * light[HERE] * exp(-0.35f * layer);
+    const float layer = layers[k * LAYER + HERE];
+    total[HERE] += seen[k * LAYER + HERE] * light[HERE] * exp(-0.35f * layer);
     light[HERE] *= exp(-0.7f * layer);
 }
 
-/* ... then averaged along x ... */
+/* ... then averaged along x, 16 pixels at a time where the border is out of reach ... */
 kernel void spread_x(global const float *light, global float *across) {
-    const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= WIDTH)
-        return;
-    float sum = 0.0f;
-    for (int s = -CONE; s <= CONE; s++)
-        sum += light[y * WIDTH + clamp(x + s, 0, WIDTH - 1)];
-    across[HERE] = sum / (2 * CONE + 1);
+    const int x = get_global_id(0) * 16, y = get_global_id(1);
+    if (x >= CONE && x + 15 + CONE < WIDTH) {
+        float16 sum = (float16)(0.0f);
+        for (int s = -CONE; s <= CONE; s++)
+            sum += vload16(0, light + HERE + s);
+        vstore16(sum / (2 * CONE + 1), 0, across + HERE);
+    } else {
+        for (int i = x; i < min(x + 16, WIDTH); i++) {
+            float sum = 0.0f;
+            for (int s = -CONE; s <= CONE; s++)
+                sum += light[y * PITCH + clamp(i + s, 0, WIDTH - 1)];
+            across[y * PITCH + i] = sum / (2 * CONE + 1);
+        }
+    }
 }
 
 /* ... and along y. */
 kernel void spread_y(global const float *across, global float *light) {
-    const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= WIDTH)
-        return;
-    float sum = 0.0f;
+    const int x = get_global_id(0) * 16, y = get_global_id(1);
+    float16 sum = (float16)(0.0f);
     for (int s = -CONE; s <= CONE; s++)
-        sum += across[clamp(y + s, 0, HEIGHT - 1) * WIDTH + x];
-    light[HERE] = sum / (2 * CONE + 1);
+        sum += vload16(0, across + clamp(y + s, 0, HEIGHT - 1) * PITCH + x);
+    vstore16(sum / (2 * CONE + 1), 0, light + HERE);
 }

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -136,18 +137,24 @@ def light(depth: np.ndarray, relief: np.ndarray, layer: float, lamps: tuple[Lamp
     """
     height, width = depth.shape
     pad = 2 + int(layer * max((lamp.slope for lamp in lamps), default=0.0))
+    pitch = -(-width // 16) * 16 + 16
     program = opencl.program(Path(__file__).with_suffix(".cl"), WIDTH=width, HEIGHT=height, LAYERS=LAYERS,
-                             SOFT_LAYERS=f"{SOFT_LAYERS}f", PAD=pad, CONE=cone)
+                             SOFT_LAYERS=f"{SOFT_LAYERS}f", PAD=pad, CONE=cone, PITCH=pitch)
     size, row = (-(-width // ROW) * ROW, height), (ROW, 1)
-    layers, seen = (opencl.empty((LAYERS, height, width)) for _ in range(2))
-    passed = opencl.empty((height, width))
-    program.split(size, row, opencl.to_device(depth), opencl.to_device(relief), layers, seen, passed)
+    vectors = (pitch // 16, height)
+
+    def on_device(values: np.ndarray) -> Any:
+        return opencl.to_device(np.pad(values, ((0, 0), (0, pitch - width))))
+
+    layers, seen = (opencl.empty((LAYERS, height, pitch)) for _ in range(2))
+    passed = opencl.empty((height, pitch))
+    program.split(vectors, None, on_device(depth), on_device(relief), layers, seen, passed)
     full = np.ones((height + 2 * pad, width + 2 * pad), np.float32)
     start, *spare = ([opencl.to_device(np.float32(share) * full) for share in (FIRST, DEEP)] for _ in range(3))
     shown = []
     for lamp in lamps:
         offsets, slant = _steps(lamp, layer)
-        total = opencl.to_device(np.zeros_like(depth))
+        total = opencl.zeros((height, pitch))
         for dx, dy in offsets:
             (ix, fx), (iy, fy) = _split(dx), _split(dy)
             source = start
@@ -156,11 +163,11 @@ def light(depth: np.ndarray, relief: np.ndarray, layer: float, lamps: tuple[Lamp
                 program.traverse(size, row, layers, seen, *source, *target, total, np.int32(k), np.int32(ix),
                                  np.int32(iy), fx, fy, slant)
                 source = target
-        shown.append(total.get() / np.float32(len(offsets)))
-    sky, across = opencl.to_device(np.zeros_like(depth)), opencl.empty((height, width))
-    arrived = opencl.to_device(np.ones_like(depth))
+        shown.append(total.get()[:, :width] / np.float32(len(offsets)))
+    sky, across = opencl.zeros((height, pitch)), opencl.empty((height, pitch))
+    arrived = on_device(np.ones_like(depth))
     for k in range(LAYERS):
         program.sink(size, row, layers, seen, arrived, sky, np.int32(k))
-        program.spread_x(size, row, arrived, across)
-        program.spread_y(size, row, across, arrived)
-    return Seen(passed.get(), tuple(shown), sky.get())
+        program.spread_x(vectors, None, arrived, across)
+        program.spread_y(vectors, None, across, arrived)
+    return Seen(passed.get()[:, :width].copy(), tuple(shown), sky.get()[:, :width].copy())

@@ -66,6 +66,17 @@ def checked_density(density: np.ndarray, dimensions: int) -> np.ndarray:
     return density
 
 
+def _blurred(values: np.ndarray, sigma: float) -> np.ndarray:
+    """`values` (Y, X) under a Gaussian of `sigma` pixels; a wide one on averages of pixels, which it cannot tell."""
+    factor = max(1, int(sigma / 5))
+    rows, columns = (-n % factor for n in values.shape)
+    averages = lic.averaged(np.pad(values, ((0, rows), (0, columns)), mode="edge"), factor)
+    # averaging has blurred by (factor^2 - 1) / 12 already
+    soft = ndimage.gaussian_filter(averages, np.sqrt(sigma**2 - (factor**2 - 1) / 12) / factor, truncate=2.5)
+    height, width = values.shape
+    return lic.resampled(soft, height + rows, width + columns, order=3)[:height, :width] if factor > 1 else soft
+
+
 def _relief(rho: np.ndarray) -> np.ndarray:
     """Half thickness (Y, X) of the sheet, 1 = full: a rounded body that carries the detail of the density.
 
@@ -73,7 +84,7 @@ def _relief(rho: np.ndarray) -> np.ndarray:
     an opaque sheet would hide, into slopes that catch the light.
     """
     def blurred(radius: float) -> np.ndarray:
-        return ndimage.gaussian_filter(rho, radius * rho.shape[0], truncate=2.5)
+        return _blurred(rho, radius * rho.shape[0])
 
     body = np.sqrt(np.clip(blurred(BODY), 0.0, 1.0)) * np.sqrt(np.clip(rho / 0.25, 0.0, 1.0))
     detail = sum(most * np.tanh(DETAIL_GAIN / most * (rho - blurred(radius))) for radius, most in DETAIL)
@@ -88,6 +99,7 @@ def _in_plane(rho: np.ndarray, towards: Iterable[tuple[float, float]], density: 
     return np.asarray(least + (1.0 - least) * shares.mean(axis=0))
 
 
+@functools.lru_cache(maxsize=4)  # the same in every frame
 def _backdrop(height: int, width: int) -> np.ndarray:
     """A pool of light (height, width, 3) on a dark wall, behind the middle of the picture."""
     y, x = np.mgrid[0:height, 0:width].astype(np.float32) / height
@@ -112,8 +124,7 @@ def lit(density: np.ndarray, width: int) -> np.ndarray:
     key = seen.lamps[0] * _in_plane(rho, sheet.directions(125.0, 20.0, 3), 6.0, 0.12)
     rim = seen.lamps[1] * _in_plane(rho, sheet.directions(30.0, 20.0, 3), 9.0, 0.05)
     sky = seen.sky * _in_plane(rho, sheet.directions(90.0, 60.0, 3), 2.0, 0.3)
-    shadow = ndimage.gaussian_filter(sheet.moved(seen.passed, -0.05 * height, 0.06 * height, 1.0), 0.03 * height,
-                                     truncate=2.5)
+    shadow = _blurred(sheet.moved(seen.passed, -0.05 * height, 0.06 * height, 1.0), 0.03 * height)
     light = seen.passed[..., None] * _backdrop(height, width) * (0.35 + 0.65 * shadow)[..., None]
     light += key[..., None] * KEY_LIGHT + rim[..., None] * RIM_LIGHT + sky[..., None] * SKY_LIGHT
     return light[::-1].copy()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from render import backend, smoke, studio
 
@@ -25,6 +26,16 @@ def test_blank_paper_is_nearly_white_and_has_grain() -> None:
 
 def test_no_smoke_shows_the_backdrop_alone() -> None:
     assert np.allclose(smoke.lit(np.zeros((16, 24)), 48)[::-1], smoke._backdrop(32, 48))
+
+
+@pytest.mark.parametrize("sigma", [2.0, 13.0, 37.0])
+def test_a_wide_blur_of_averages_is_a_gaussian(sigma: float) -> None:
+    rng = np.random.Generator(np.random.Philox(key=4))
+    values = np.pad(rng.random((61, 90), dtype=np.float32), 100)
+    blurred = smoke._blurred(values, sigma)
+    assert blurred.shape == values.shape
+    np.testing.assert_allclose(blurred, ndimage.gaussian_filter(values, sigma, truncate=2.5),
+                               atol=0.01 * blurred.max())
 
 
 @pytest.mark.parametrize("draw", [smoke.lit, smoke.ink])

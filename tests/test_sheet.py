@@ -32,7 +32,7 @@ def test_shadow_falls_away_from_the_light() -> None:
     assert depth[30, 30] == depth[30, 10] == depth[10, 30] == 0.0
 
 
-@pytest.mark.parametrize("shape", [(2, 2), (5, 7), (33, 18)])
+@pytest.mark.parametrize("shape", [(2, 2), (5, 7), (33, 18), (9, 70)])
 def test_kernels_equal_their_reference(shape: tuple[int, int]) -> None:
     rng = np.random.Generator(np.random.Philox(key=8))
     depth, relief = 6.0 * rng.random(shape, dtype=np.float32), 1.2 * rng.random(shape, dtype=np.float32)
