@@ -87,3 +87,36 @@ def _owners(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray) -> tuple[
     nearest = np.maximum(np.abs(x), np.abs(y)).argmin(axis=1)
     rows = np.arange(len(cells))
     return index[rows, nearest], np.stack([x[rows, nearest], y[rows, nearest]], axis=-1)
+
+
+def blocks(frame: np.ndarray, edge: int, random: np.random.Generator) -> np.ndarray:
+    """The mosaic in three dimensions: cubes of `edge` cells turned with the frame (Z, Y, X, 3, 3) fill the domain.
+
+    Returns for each cell its offset from the middle of the cube that holds it, in that cube's local frame:
+    (Z, Y, X, 3) float32. The cubes' centres relax as in `mosaic`.
+    """
+    shape = frame.shape[:3]
+    # x, y, z
+    cells = np.stack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in shape), indexing="ij")[::-1], axis=-1)
+    count = max(1, round(CROWDING * cells[..., 0].size / edge**3))
+    centres = random.random((count, 3), dtype=np.float32) * (np.array(shape[::-1], np.float32) - 1)
+    stride = max(1, edge // 8)
+    some = cells[::stride, ::stride, ::stride].reshape(-1, 3)
+    for _ in range(RELAXATIONS):
+        nearest, _ = _block_owners(some, centres, frame)
+        members = np.bincount(nearest, minlength=count)
+        sums = np.stack([np.bincount(nearest, some[:, i], minlength=count) for i in range(3)], axis=-1)
+        centres = np.where(members[:, None] > 0, sums / np.maximum(members, 1)[:, None], centres).astype(np.float32)
+    return _block_owners(cells.reshape(-1, 3), centres, frame)[1].reshape(*shape, 3)
+
+
+def _block_owners(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For each of cells (P, 3) the centre whose turned cube holds it best, and the offset in that cube's frame."""
+    _, index = cKDTree(centres).query(cells, k=min(NEAREST, len(centres)))
+    index = index.reshape(len(cells), -1)
+    x, y, z = np.rint(centres).astype(int).T
+    turns = frame[z, y, x]
+    offset = np.einsum("pkd,pkde->pke", cells[:, None] - centres[index], turns[index])
+    nearest = np.abs(offset).max(axis=-1).argmin(axis=1)
+    rows = np.arange(len(cells))
+    return index[rows, nearest], offset[rows, nearest].astype(np.float32)

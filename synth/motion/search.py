@@ -83,7 +83,7 @@ class Matcher:
                               CANDIDATES=self.candidates, DAMPING=f"{DAMPING}f")
 
     @cached_property
-    def _points(self) -> Any:
+    def points(self) -> Any:
         return opencl.to_device(self.space.points)
 
     @cached_property
@@ -99,7 +99,7 @@ class Matcher:
         return opencl.to_device(side_by_side), opencl.to_device(half), np.int32(blocks)
 
     @cached_property
-    def _similar(self) -> Any:
+    def similar(self) -> Any:
         return opencl.to_device(similar_sets(self.space.points, self.candidates))
 
     @property
@@ -118,14 +118,14 @@ class Matcher:
         """Best k-coherent candidates; match (S,) int32 is the last search's result on the same sites."""
         count = queries.shape[0]
         best, distance = opencl.empty(count, np.int32), opencl.empty(count)
-        self._program.coherent(grid[::-1], None, self._points, self._similar, self._size, queries, sites, axis,
+        self._program.coherent(grid[::-1], None, self.points, self.similar, self._size, queries, sites, axis,
                                np.array(grid[::-1], np.int32), match, best, distance)
         return best, distance
 
     def refine(self, queries: Any, best: Any) -> Any:
         """Sub-cell positions (S, 2) float32 (x, y) of matches in the exemplar."""
         position = opencl.empty((queries.shape[0], 2))
-        self._program.refine((queries.shape[0],), None, self._points, self._size, queries, best, position)
+        self._program.refine((queries.shape[0],), None, self.points, self._size, queries, best, position)
         return position
 
 
