@@ -11,6 +11,7 @@ In the order data passes through them:
     assignment    least squares over the matches (§3.1)
     boundary      E_n, the soft boundary condition (§3.6, Eq. 3)
     detail        all of these, level by level and frame by frame (pseudocode 1 and 2)
+    solid         the same in three dimensions, from views (§3.2)
     quality       how good a synthesized field is
     combine       F = upsample(L) + omega H' (§3.5), and its projection (§3.6)
     density       the smoke that F carries, naive and windowed (supplement A, pseudocode 3 and 4)

@@ -62,7 +62,7 @@ inline int wrapped_to(int i, int n) {
     i %= n;
     return i < 0 ? i + n : i;
 }
-inline int cell(float4 way, int match, int4 exemplar) {
+inline int shifted(float4 way, int match, int4 exemplar) {
     const int x = wrapped_to(match % exemplar.x + convert_int_rte(way.x), exemplar.x);
     const int y = wrapped_to(match / exemplar.x % exemplar.y + convert_int_rte(way.y), exemplar.y);
     const int z = wrapped_to(match / (exemplar.x * exemplar.y) + convert_int_rte(way.z), exemplar.z);
@@ -87,7 +87,7 @@ typedef float4 texel;
 #else
 typedef float2 place;
 typedef float8 spread;
-inline int cell(float4 way, int match, int4 exemplar) {
+inline int shifted(float4 way, int match, int4 exemplar) {
     return wrapped(match % exemplar.x + convert_int_rte(way.x), match / exemplar.x + convert_int_rte(way.y),
                    exemplar.xy);
 }
@@ -113,7 +113,7 @@ __kernel void coherent_solid(__global const float *points, __global const int *s
         if (x + dx < 0 || y + dy < 0 || z + dz < 0 || x + dx >= grid.x || y + dy >= grid.y || z + dz >= grid.z) continue;
         const float4 way = -SPACING * (float4)(dx, dy, dz, 0.0f);
         const float4 seen = (float4)(dot(a, way), dot(b, way), dot(c, way), 0.0f);
-        const int centre = cell(seen, match[s + (dz * grid.y + dy) * grid.x + dx], exemplar);
+        const int centre = shifted(seen, match[s + (dz * grid.y + dy) * grid.x + dx], exemplar);
         for (int k = 0; k < CANDIDATES; k++) {
             const int candidate = similar[centre * CANDIDATES + k];
             const float d = squared_distance(queries, points + candidate * DIMS);

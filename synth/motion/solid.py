@@ -22,7 +22,7 @@ from scipy import ndimage
 from synth import opencl, pyramid
 from synth.advect import Grid
 from synth.motion import initialize, neighborhood
-from synth.motion.assignment import catmull_rom, robust_weights, sample_reference
+from synth.motion.assignment import robust_weights
 from synth.motion.detail import COHERENCE, DEFORMED
 from synth.motion.frames import solid_frame
 from synth.motion.search import DAMPING, QUERIES_TOGETHER, Matcher
@@ -226,13 +226,13 @@ class Eye:
             if match is None:
                 best[first:first + some], distance[first:first + some] = self.matcher.exact(queries)
             else:
-                program.coherent_solid((some,), (1,), self.matcher.points, self.matcher.similar, exemplar, queries, legs,
-                                       cells, np.int32(first), match, best, distance)
+                program.coherent_solid((some,), (1,), self.matcher.points, self.matcher.similar, exemplar, queries,
+                                       legs, cells, np.int32(first), match, best, distance)
             if self.view.dimension == 2:
                 positions.append(self.matcher.refine(queries, best[first:first + some].copy()))
         if self.view.dimension == 2:
             return best, _joined(positions), distance
-        x, y, z = exemplar[:3]
+        x, y = exemplar[:2]
         index = best.get()
         place = np.stack([index % x, index // x % y, index // (x * y), np.zeros_like(index)], -1)
         return best, opencl.to_device(place.astype(np.float32)), distance
