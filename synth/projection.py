@@ -7,8 +7,9 @@ see the checkerboard mode; they leave it in the field.
 
 With an obstacle the divergence of a cell is what flows out through the open parts of its faces [Batty et al. 2007],
 the velocity on a face being the mean of its two cells: central differences wherever all is open. The pressure's
-gradient is the negative transpose of that, so the projection stays orthogonal; conjugate gradients solve for the
-pressure, preconditioned by the exact solution without the obstacle.
+gradient is the negative transpose of that in the inner product that weights cells by how open they are, so the
+projection stays orthogonal; conjugate gradients solve for the pressure, preconditioned by the exact solution
+without the obstacle.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ def _component(axis: int, dimension: int) -> int:
 def _slope(a: np.ndarray, axis: int, border: str, of_pressure: bool) -> np.ndarray:
     """Central difference of `a` along an axis, with the border's ghost cells."""
     n = a.shape[axis]
-    padded = _continued(a, axis, border, _GHOST[border][of_pressure] if border in _GHOST else 1.0)
+    padded = _continued(a, axis, border, of_pressure)
     return 0.5 * (np.take(padded, range(2, n + 2), axis) - np.take(padded, range(n), axis))
 
 
@@ -117,15 +118,8 @@ def openings(distance: np.ndarray, border: str) -> list[np.ndarray]:
                 free, all_of_it = _paired(free, other), _paired(all_of_it, other)
         share = free / np.maximum(all_of_it, 1e-12)
         share[share < SLIVER] = 0
-        if border == "wall":
-            _at(share, axis, 0)[...] = _at(share, axis, -1)[...] = 0
         shares.append(share)
     return shares
-
-
-def _at(a: np.ndarray, axis: int, index: int) -> np.ndarray:
-    """The view of `a` at one index of an axis."""
-    return a[(slice(None),) * axis + (index,)]
 
 
 def _paired(a: np.ndarray, axis: int) -> np.ndarray:
@@ -134,27 +128,32 @@ def _paired(a: np.ndarray, axis: int) -> np.ndarray:
     return np.take(a, range(1, n), axis) + np.take(a, range(n - 1), axis)
 
 
-def _continued(a: np.ndarray, axis: int, border: str, sign: float) -> np.ndarray:
-    """`a` with a ghost cell at each end: the other end's, or `sign` times the outermost."""
+def _continued(a: np.ndarray, axis: int, border: str, of_pressure: bool) -> np.ndarray:
+    """`a` with the border's ghost cell at each end of an axis."""
     first, last = np.take(a, [0], axis), np.take(a, [-1], axis)
-    ghosts = (last, first) if border == "toroidal" else (sign * first, sign * last)
-    return np.concatenate([ghosts[0], a, ghosts[1]], axis)
+    if border == "toroidal":
+        return np.concatenate([last, a, first], axis)
+    sign = _GHOST[border][of_pressure]
+    return np.concatenate([sign * first, a, sign * last], axis)
 
 
 def _outflow(v: np.ndarray, shares: list[np.ndarray], border: str) -> np.ndarray:
     """What flows out of each cell through the open parts of its faces."""
     total = np.zeros(v.shape[:-1])
     for axis, share in enumerate(shares):
-        along = _continued(v[..., _component(axis, total.ndim)], axis, border, 1.0)
+        along = _continued(v[..., _component(axis, total.ndim)], axis, border, of_pressure=False)
         total += np.diff(0.5 * share * _paired(along, axis), axis=axis)
     return total
 
 
 def _push(p: np.ndarray, shares: list[np.ndarray], border: str) -> np.ndarray:
-    """The gradient of a pressure as cells feel it through their open faces: -1 times the transpose of `_outflow`."""
+    """The gradient of a pressure as cells feel it: the mean of its differences over the open parts of their faces.
+
+    With cells weighted by their open share it is -1 times the transpose of `_outflow`.
+    """
     felt = []
     for axis, share in enumerate(shares):
-        forces = share * np.diff(_continued(p, axis, border, -1.0), axis=axis)
+        forces = share * np.diff(_continued(p, axis, border, of_pressure=True), axis=axis)
         felt.append(_paired(forces, axis) / np.maximum(_paired(share, axis), SLIVER))
     return np.stack(felt[::-1], axis=-1)
 
@@ -163,8 +162,6 @@ def _past(v: np.ndarray, border: str, distance: np.ndarray) -> np.ndarray:
     """`project` with an obstacle."""
     shape, size = distance.shape, distance.size
     shares = openings(distance, border)
-    # cells that a wall cuts keep most of what they had: it must not be the flow through the obstacle
-    v = _along_walls(v, distance < 0, distance)
     source = _outflow(v, shares, border)
     slopes = [np.gradient(v, axis=axis) for axis in range(v.ndim - 1) if shape[axis] > 1]
     scale = np.sqrt(max(np.mean(np.square(slopes)) if slopes else 0.0, np.mean(source**2)))

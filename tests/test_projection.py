@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from synth import obstacle
 from synth.noise import curl_noise
-from synth.projection import BORDERS, divergence, project
+from synth.projection import BORDERS, divergence, openings, project
 
 SHAPES = [(8, 8), (5, 7), (33, 20), (1, 9), (5, 7, 3), (2, 2, 2), (12, 16, 9)]
 everywhere = pytest.mark.parametrize("border", BORDERS)
@@ -97,3 +98,87 @@ def test_refusals():
         project(noise((4, 4)), "clamp")
     with pytest.raises(ValueError, match="velocity field is"):
         project(np.zeros((4, 4), np.float32))
+
+
+def stone(shape):
+    """Cells to the wall of a ball of 0.22 heights a little off the middle."""
+    centre = (0.03, 0.45, 0.02)[: len(shape)]
+    return obstacle.ball(shape, centre, 0.22).distance
+
+
+def rms_gradient(v):
+    return float(np.sqrt(np.mean([np.gradient(v, axis=axis).astype(float) ** 2 for axis in range(v.ndim - 1)])))
+
+
+@everywhere
+@pytest.mark.parametrize("shape", [(24, 32), (33, 20), (40, 57), (12, 16, 9), (9, 24, 31)])
+def test_past_an_obstacle_the_result_is_divergence_free(shape, border):
+    distance = stone(shape)
+    v = project(noise(shape), border, distance)
+    assert rms(divergence(v, border, distance)) <= 1e-4 * rms_gradient(v)
+
+
+@everywhere
+@pytest.mark.parametrize("shape", [(24, 32), (9, 24, 31)])
+def test_past_an_obstacle_too_a_second_projection_changes_nothing(shape, border):
+    distance = stone(shape)
+    once = project(noise(shape), border, distance)
+    assert rms(project(once, border, distance) - once) < 2e-3 * rms(once)
+
+
+@everywhere
+def test_an_obstacle_far_away_is_none(border):
+    """All faces open, and conjugate gradients come to what the transform gives at once."""
+    v = noise((20, 31))
+    far = np.full((20, 31), 50, np.float32)
+    np.testing.assert_allclose(divergence(v, border, far), divergence(v, border), atol=1e-6)
+    np.testing.assert_allclose(project(v, border, far), project(v, border), atol=5e-4)
+
+
+def test_a_wind_passes_round_a_disc_as_the_potential_flow_does():
+    shape, centre, radius = (150, 200), (0.0, 0.5), 0.06
+    distance = obstacle.ball(shape, centre, radius).distance
+    wind = np.zeros((*shape, 2), np.float32)
+    wind[..., 0] = 1.0
+    v = project(wind, "open", distance)
+    y, x = np.mgrid[:150, :200]
+    x, y = (x + 0.5) / 150 - 2 / 3, (y + 0.5) / 150 - 0.5
+    squared = x * x + y * y
+    ratio = radius**2 / squared
+    exact = np.stack([1 - ratio * (x * x - y * y) / squared, -2 * ratio * x * y / squared], -1)
+    away = (distance > 1.5) & (np.hypot(x, y) < 3 * radius)
+    assert rms((v - exact)[away]) < 0.05
+    near = (distance > 0) & (distance < 1.5)
+    normal = obstacle.outward(distance)
+    assert rms(np.sum(v * normal, -1)[near]) < 0.12
+    inside = (distance < -1) & (distance > -4)
+    assert rms(np.sum(v * normal, -1)[inside]) < 1e-6 and rms(v[inside]) > 0.5  # along the wall there too
+
+
+def test_nothing_comes_out_of_a_closed_box():
+    """A square without a face to the outside: what flows inside is no matter of the outside."""
+    distance = obstacle.box((32, 32), (0.0, 0.5), (0.25, 0.25)).distance  # its walls are faces of cells
+    wild, calm = noise((32, 32)), noise((32, 32))
+    calm[distance < -1] = 0
+    outside = distance > 0
+    wild[outside] = calm[outside]
+    np.testing.assert_allclose(project(wild, "wall", distance)[outside], project(calm, "wall", distance)[outside],
+                               atol=2e-3)
+
+
+@everywhere
+@pytest.mark.parametrize("shape", [(7, 9), (4, 6, 5)])
+def test_open_shares_are_none_inside_and_all_far_outside(shape, border):
+    distance = stone(shape) * 3
+    for axis, share in enumerate(openings(distance, border)):
+        assert share.shape == tuple(n + (i == axis) for i, n in enumerate(shape))
+        assert share.min() == 0 and share.max() == 1
+    half = np.broadcast_to(np.arange(6) - 2.5, (5, 6)).astype(np.float32)  # a wall midway through the third cells
+    across_y, across_x = openings(half, "toroidal")
+    np.testing.assert_allclose(across_y[1, 1:-1], [0, 0, 1, 1])
+    np.testing.assert_allclose(across_x[2, 2:-1], [0, 0, 1, 1][:across_x.shape[1] - 3], atol=1e-6)
+
+
+def test_an_obstacle_of_another_size_is_refused():
+    with pytest.raises(ValueError, match="does not fit"):
+        project(noise((4, 4)), "wall", np.ones((4, 5), np.float32))
