@@ -1,4 +1,4 @@
-"""Motion field texture synthesis (Ma, Wei, Guo, Zhou 2009: "ma09"), same dimension.
+"""Motion field texture synthesis (Ma, Wei, Guo, Zhou 2009: "ma09").
 
 In the order data passes through them:
 
@@ -12,6 +12,7 @@ In the order data passes through them:
     boundary      E_n, the soft boundary condition (§3.6, Eq. 3)
     detail        all of these, level by level and frame by frame (pseudocode 1 and 2)
     solid         the same in three dimensions, from views (§3.2)
+    potential     as detail, of the potential of H: free of divergence (§3.6, Discussion)
     quality       how good a synthesized field is
     combine       F = upsample(L) + omega H' (§3.5), and its projection (§3.6)
     density       the smoke that F carries, naive and windowed (supplement A, pseudocode 3 and 4)
@@ -22,5 +23,6 @@ Notation, as in the paper:
     I  exemplar                L  coarse motion         H  detail, H' after the coordinate transformation
     F  final motion            omega  weight of H'      D  density, O  density under L alone
     m  window, in frames       x_p, z_p  output neighbourhood and its match      E_t  their energy
+    psi  potential, H' = curl psi
     E_n  energy of the boundary, n its normal, b the motion given there, lambda its weight
 """

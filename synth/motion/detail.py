@@ -137,10 +137,11 @@ class Synthesis:
 
     def frame(self, L: np.ndarray, state: State | None) -> State:
         """The state after the frame with coarse motion L (Y, X, 2) cells per frame; None before the first."""
-        motions = [np.pad(motion / np.float32(2 ** (len(self.levels) - 1 - i)),
-                          ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="edge")
+        motions = [motion / np.float32(2 ** (len(self.levels) - 1 - i))
                    for i, motion in enumerate(pyramid.pyramid(L, len(self.levels), toroidal=False))]
-        frames = [local_frame(motion, self.along) for motion in motions]
+        # before the margins: these are the frames that turn H into H' afterwards
+        frames = [_margin(local_frame(motion, self.along)) for motion in motions]
+        motions = [_margin(motion) for motion in motions]
         return State(self._first(frames) if state is None else self._next(motions, frames, state), frames)
 
     def _first(self, frames: list[np.ndarray]) -> list[np.ndarray]:
@@ -217,6 +218,11 @@ def deformation(way: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.nd
         across = after[..., 0] * moved[..., 1] - after[..., 1] * moved[..., 0] - (i == 1)
         total += along**2 + across**2
     return np.sqrt(total)
+
+
+def _margin(field: np.ndarray) -> np.ndarray:
+    """A field (Y, X, 2) continued over the margin."""
+    return np.pad(field, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="edge")
 
 
 def _finer(H: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -15,13 +15,13 @@ EMPTY = 0.55
 
 
 def random_pixels(exemplar: np.ndarray, shape: tuple[int, int], random: np.random.Generator) -> np.ndarray:
-    """Pixels copied at random from the exemplar (N, M, 2), as the paper does: (Y, X, 2)."""
-    pixels = exemplar.reshape(-1, 2)
+    """Pixels copied at random from the exemplar (N, M, K), as the paper does: (Y, X, K)."""
+    pixels = exemplar.reshape(-1, exemplar.shape[-1])
     return pixels[random.integers(len(pixels), size=shape)]
 
 
 def mosaic(exemplar: np.ndarray, frame: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Whole exemplars laid as tiles of a mosaic that follows the frame (Y, X, 2): (Y, X, 2).
+    """Whole exemplars laid as tiles of a mosaic that follows the frame (Y, X, 2): (Y, X, K).
 
     The tiles' centres relax as in Hausner 2001 (centroidal Voronoi cells of squares turned with the frame), so
     that each cell of the mosaic is about one exemplar large and a closed motif in its middle stays whole.
@@ -41,11 +41,11 @@ def mosaic(exemplar: np.ndarray, frame: np.ndarray, random: np.random.Generator)
         centres = np.where(members[:, None] > 0, sums / np.maximum(members, 1)[:, None], centres).astype(np.float32)
     _, offset = _owners(cells, centres, frame)
     at = np.rint(offset + (size - 1) / 2).astype(int) % size
-    return exemplar[at[:, 1], at[:, 0]].reshape(rows, columns, 2)
+    return exemplar[at[:, 1], at[:, 0]].reshape(rows, columns, -1)
 
 
 def reseed(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """H (Y, X, 2) with a whole exemplar laid into each place that has run empty.
+    """H (Y, X, K) with a whole exemplar (N, M, K) laid into each place that has run empty.
 
     A place is empty where the mean square of H over an exemplar's area is below EMPTY of the exemplar's own. A
     flow that shears and stretches lets motifs die out; least squares alone never brings one back.
