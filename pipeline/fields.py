@@ -1,88 +1,115 @@
-"""What synth makes, in out/X/fields: the exemplar I, the coarse motion L and the detail H, 2-D fields as EXR.
+"""What synth makes, in out/X/fields: the exemplars I, the coarse motion L and the detail H; 2-D fields as EXR, 3-D ones
+as VDB.
 
-L is a velocity in world units per second. The exemplar and H are in the exemplar's unit (its longest vector is
+L is a velocity in world units per second. The exemplars and H are in the exemplar's unit (its longest vector is
 1), H in the exemplar's coordinates, before the coordinate transformation: so ω and what follows it is tuned
-without re-synthesis.
+without re-synthesis. Where the local frame faces out of the smoke (§3.3), O is the smoke that L alone carries.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import io
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pipeline.errors import BadInput
 from pipeline.files import atomic, images, pictures, volumes
-from pipeline.product import Product, Stock
+from pipeline.product import Frames, Product, Stock, value_at
 from pipeline.schema import Scene
-from synth.field import Field
-
-if TYPE_CHECKING:
-    from synth.motion.detail import State
+from synth.field import Field, domain_origin
 
 
-def exr(scene: Scene) -> str:
-    """The suffix of a 2-D field."""
-    return "exr"
+def suffix(scene: Scene) -> str:
+    """The suffix of a field."""
+    return "exr" if scene.dimension == 2 else "vdb"
 
 
 def write_field(file: Path, field: Field, scene: Scene) -> None:
-    """Write a 2-D field."""
-    images.write_field(file, field)
+    """Write a 2-D field as EXR, a 3-D one as VDB: grid `vel` of vectors, `density` of scalars."""
+    if field.dimension == 2:
+        images.write_field(file, field)
+    else:
+        volumes.write(file, {"vel" if field.is_vector else "density": field})
+
+
+def write_velocity(file: Path, field: Field, scene: Scene) -> None:
+    """Write a velocity; a volume says its unit and its rate."""
+    if field.dimension == 2:
+        images.write_field(file, field)
+    else:
+        volumes.write(file, {"vel": field}, metadata={"unit": "world units per second", "fps": f"{scene.fps:g}"})
+
+
+def write_detail(file: Path, field: Field, scene: Scene) -> None:
+    """Write H; a volume says that it is no velocity of the world."""
+    if field.dimension == 2:
+        images.write_field(file, field)
+    else:
+        volumes.write(file, {"vel": field}, metadata={"unit": "the exemplar's longest vector", "axes": "local frame"})
 
 
 def read_field(file: Path, scene: Scene) -> Field:
-    """Read a field that `write_field` wrote; its checksum vouches for it, so it needs no child process."""
-    return images.read_field(file)
+    """Read a field that one of these wrote; its checksum vouches for it, so it needs no child process."""
+    if file.suffix != ".vdb":
+        return images.read_field(file)
+    (field,) = volumes.read(file).values()
+    return field
 
 
-def foreign_field(file: Path, key: str) -> Field:
-    """A 2-D vector field of the user's: an EXR, or the middle slice of a VDB's grid `vel`."""
+def foreign_field(file: Path, key: str, dimension: int = 2) -> Field:
+    """A vector field of the user's: an EXR, or a VDB's grid `vel`, in the plane its middle slice."""
     try:
         field = volumes.read_foreign(file, "vel") if file.suffix == ".vdb" else images.read_foreign_field(file, key)
     except BadInput as error:
         raise BadInput(file, key, error.reason) from error
     if not field.is_vector:
         raise BadInput(file, key, "holds no vector field")
-    if field.dimension == 3:
+    if field.dimension < dimension:
+        raise BadInput(file, key, "is flat, and detail.size is not: it takes a VDB with a grid vel")
+    if field.dimension > dimension:
         field = Field(field.values[len(field.values) // 2, ..., :2], field.voxel_size, field.origin[:2])
     return field
 
 
-def make_exemplar(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
-    """I, from its procedure or its file."""
-    from synth.motion import exemplar
+def _exemplar(key: str) -> Callable[[Scene, Stock, list[int]], Iterator[tuple[int, Field]]]:
+    """Makes the exemplar whose table is at `key` of the scene, from its procedure or its file."""
 
-    wanted: Any = scene.exemplar
-    match wanted.kind:
-        case "bitmap":
-            values = exemplar.from_bitmap(pictures.read_grey(wanted.file, "exemplar.file"), wanted.size, wanted.blur)
-        case "drawing" if wanted.file.suffix == ".svg":
-            values = exemplar.from_svg(_text(wanted.file), wanted.size)
-        case "drawing":
-            values = exemplar.from_drawing(pictures.read_foreign(wanted.file, "exemplar.file")[::-1], wanted.size)
-        case "field":
-            values = exemplar.from_field(foreign_field(wanted.file, "exemplar.file").values, wanted.size,
-                                         wanted.toroidal)
-        case "clip":
-            from pipeline.files import video
+    def make(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
+        from synth.motion import exemplar
 
-            values = exemplar.from_clip(video.read_grey(wanted.file, "exemplar.file"), wanted.size)
-        case _:
-            values = exemplar.exemplar(wanted.kind, wanted.size)
-    yield 0, Field.centred(values, 2)
+        wanted: Any = value_at(scene, key)
+        file = f"{key}.file"
+        match wanted.kind:
+            case "bitmap":
+                values = exemplar.from_bitmap(pictures.read_grey(wanted.file, file), wanted.size, wanted.blur)
+            case "drawing" if wanted.file.suffix == ".svg":
+                values = exemplar.from_svg(_text(wanted.file, file), wanted.size)
+            case "drawing":
+                values = exemplar.from_drawing(pictures.read_foreign(wanted.file, file)[::-1], wanted.size)
+            case "field":
+                solid = scene.dimension == 3 and wanted.solid
+                foreign = foreign_field(wanted.file, file, 3 if solid else 2).values
+                values = (exemplar.from_volume if solid else exemplar.from_field)(foreign, wanted.size, wanted.toroidal)
+            case "clip":
+                from pipeline.files import video
+
+                values = exemplar.from_clip(video.read_grey(wanted.file, file), wanted.size)
+            case _:
+                values = exemplar.exemplar(wanted.kind, wanted.size)
+        yield 0, Field.centred(values, values.ndim - 1)
+
+    return make
 
 
-def _text(file: Path) -> str:
+def _text(file: Path, key: str) -> str:
     try:
         return file.read_text(encoding="utf-8")
     except UnicodeDecodeError:
-        raise BadInput(file, "exemplar.file", "is not an SVG document in UTF-8") from None
+        raise BadInput(file, key, "is not an SVG document in UTF-8") from None
 
 
 def make_coarse(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
@@ -91,68 +118,135 @@ def make_coarse(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
 
     wanted: Any = scene.coarse
     if wanted.kind == "file":
-        steady = foreign_field(wanted.file, "coarse.file")
-        (rows, columns), detail = steady.shape, scene.detail.size
-        if detail[0] * rows != detail[1] * columns:
-            raise BadInput(wanted.file, "coarse.file", f"{columns}×{rows} has not the shape of detail.size, "
-                                                       f"{detail[0]}×{detail[1]}")
-        steady = Field.centred(steady.values, 2)
+        steady = foreign_field(wanted.file, "coarse.file", scene.dimension)
+        size, detail = steady.shape[::-1], scene.detail.size
+        if any(n * size[1] != detail[1] * m for n, m in zip(detail, size, strict=True)):
+            raise BadInput(wanted.file, "coarse.file", f"{'×'.join(map(str, size))} has not the shape of detail.size, "
+                                                       f"{'×'.join(map(str, detail))}")
+        steady = Field.centred(steady.values, scene.dimension)
         yield from ((frame, steady) for frame in frames)
         return
-    columns, rows = wanted.size
     settings = wanted.model_dump(exclude={"kind", "size"})
-    motion = coarse(wanted.kind, (rows, columns), frames[-1], scene.seed, **settings)
+    motion = coarse(wanted.kind, wanted.size[::-1], frames[-1], scene.seed, **settings)
     for frame, values in enumerate(motion, start=1):
         if frame in frames:
-            yield frame, Field.centred(values, 2).per_second(scene.fps)
+            yield frame, Field.centred(values, scene.dimension).per_second(scene.fps)
+
+
+def make_smoke(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
+    """O on the cells of L: the smoke that the coarse motion alone carries (supplement A, pseudocode 4)."""
+    from synth.motion.density import naive
+
+    L = (stock.read("L", frame).per_frame(scene.fps).values for frame in range(1, frames[-1] + 1))
+    for frame, values in enumerate(naive(L, sources(scene), border=scene.density.border), start=1):
+        if frame in frames:
+            yield frame, Field.centred(values, scene.dimension)
+
+
+def sources(scene: Scene) -> list[Any]:
+    """The sources of the density, as synth.motion.density takes them."""
+    from synth.motion.density import Source
+
+    made = []
+    for number, source in enumerate(scene.density.sources):
+        radius = source.radius if len(source.radius) > 1 else source.radius[0]
+        settings = source.model_dump(exclude={"radius"})
+        made.append(Source(radius=radius, seed=scene.seed + number, **settings))
+    return made
 
 
 def make_detail(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
     """H, sequential in time. An interrupted run goes on from the state kept beside its last frame: same bits."""
-    from synth.motion import detail
-
-    wanted = scene.detail
-    columns, rows = wanted.size
-    levels = detail.enough_levels(scene.exemplar.size) if wanted.levels == "auto" else wanted.levels
-    settings = detail.Settings(levels, wanted.neighborhoods, wanted.iterations, wanted.search, wanted.k,
-                               wanted.along)
-    synthesis = detail.Synthesis(stock.read("exemplar").values, (rows, columns), settings, scene.seed)
-    done, state = _kept(stock, frames[0])
+    synthesis, state_type = _flat_synthesis(scene, stock) if scene.dimension == 2 else _solid_synthesis(scene, stock)
+    done, state = _kept(stock, frames[0], state_type)
     for frame in range(done + 1, frames[-1] + 1):
-        state = synthesis.frame(coarse_cells(scene, stock, frame), state)
+        L = coarse_cells(scene, stock, frame)
+        state = synthesis.frame(L, state) if scene.dimension == 2 else synthesis.frame(
+            L, towards(scene, stock, frame), state)
         if frame in frames:
-            yield frame, Field.centred(synthesis.visible(state), 2)
+            yield frame, Field.centred(synthesis.visible(state), scene.dimension)
         if frame < frames[-1]:
             _keep(stock, frame, state)
 
 
+def _flat_synthesis(scene: Scene, stock: Stock) -> tuple[Any, type]:
+    from synth.motion import detail
+
+    wanted = scene.detail
+    levels = detail.enough_levels(scene.exemplar.size) if wanted.levels == "auto" else wanted.levels
+    settings = detail.Settings(levels, wanted.neighborhoods, wanted.iterations, wanted.search, wanted.k, wanted.along)
+    return detail.Synthesis(stock.read("exemplar").values, (scene.shape[0], scene.shape[1]), settings,
+                            scene.seed), detail.State
+
+
+def _solid_synthesis(scene: Scene, stock: Stock) -> tuple[Any, type]:
+    from synth.motion import solid
+
+    views = solid_views(scene, {name: stock.read(name).values for name in scene.exemplars})
+    return solid.Synthesis(views, _solid_shape(scene), solid_settings(scene), scene.seed), solid.State
+
+
+def solid_views(scene: Scene, values: dict[str, np.ndarray]) -> list[Any]:
+    """The views of a 3-D scene for synth.motion.solid; values: of each exemplar, by its product's name."""
+    from synth.motion.solid import View
+
+    tables = {value_at(scene, key): name for name, key in scene.exemplars.items()}
+    return [View(values[tables[view.exemplar]], *view.axes, weight=view.weight) for view in scene.seen]
+
+
+def solid_settings(scene: Scene) -> Any:
+    """The settings of the synthesis in space."""
+    from synth.motion import detail, solid
+
+    wanted = scene.detail
+    levels = detail.enough_levels(min(view.exemplar.size for view in scene.seen if view.exemplar)) if (
+        wanted.levels == "auto") else wanted.levels
+    return solid.Settings(levels, wanted.neighborhoods, wanted.iterations, wanted.search, wanted.k, wanted.along)
+
+
 def coarse_cells(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
-    """L (Y, X, 2) on the cells of H, cells per frame."""
+    """L (Y, X, 2) or (Z, Y, X, 3) on the cells of H, cells per frame."""
     from synth.motion.coarse import upsample
 
-    columns, rows = scene.detail.size
-    return upsample(stock.read("L", frame).per_frame(scene.fps).values, (rows, columns))
+    return upsample(stock.read("L", frame).per_frame(scene.fps).values, scene.shape)
+
+
+def towards(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
+    """What the local z axis faces (Z, Y, X, 3), of any length, on the cells of H (§3.3)."""
+    from synth.motion import frames as local
+    from synth.motion.coarse import upsample
+
+    match scene.detail.facing:
+        case "density":
+            return upsample(local.outward(stock.read("O", frame).values), scene.shape)
+        case "directions":
+            cells = (np.array([d.at for d in scene.detail.directions]) - domain_origin(scene.shape)) * scene.shape[-2]
+            return local.interpolated_directions(
+                cells, np.array([d.vector for d in scene.detail.directions]), _solid_shape(scene))
+    return np.broadcast_to(np.array([0, 0, 1], np.float32), (*scene.shape, 3))
+
+
+def _solid_shape(scene: Scene) -> tuple[int, int, int]:
+    z, y, x = scene.shape
+    return z, y, x
 
 
 STATE = "H.state.npz"
 
 
-def _keep(stock: Stock, frame: int, state: State) -> None:
+def _keep(stock: Stock, frame: int, state: Any) -> None:
     """Keep what frame + 1 is made from: each list of arrays of the state, by its name and their numbers."""
     arrays = {f"{field.name}.{level}": values
               for field in dataclasses.fields(state) for level, values in enumerate(getattr(state, field.name))}
-    content = io.BytesIO()
-    np.savez(content, allow_pickle=False, **{"frame": np.array(frame), "key": np.array(stock.key(frame)), **arrays})
-    atomic.write_bytes(stock.work / STATE, content.getvalue())
+    with atomic.replacing(stock.work / STATE) as temporary, temporary.open("wb") as content:
+        np.savez(content, allow_pickle=False, **{"frame": np.array(frame), "key": np.array(stock.key(frame)), **arrays})
 
 
-def _kept(stock: Stock, first: int) -> tuple[int, State | None]:
+def _kept(stock: Stock, first: int, state_type: type) -> tuple[int, Any]:
     """The last frame before `first` whose state is kept, and the state; (0, None) if there is none."""
-    from synth.motion.detail import State
-
-    lists: dict[str, list[np.ndarray]] = {field.name: [] for field in dataclasses.fields(State)}
+    lists: dict[str, list[np.ndarray]] = {field.name: [] for field in dataclasses.fields(state_type)}
     try:
-        with np.load(io.BytesIO((stock.work / STATE).read_bytes()), allow_pickle=False) as kept:
+        with (stock.work / STATE).open("rb") as file, np.load(file, allow_pickle=False) as kept:
             frame = int(kept["frame"])
             if not 0 < frame < first or str(kept["key"]) != stock.key(frame):
                 return 0, None
@@ -160,23 +254,49 @@ def _kept(stock: Stock, first: int) -> tuple[int, State | None]:
                 field, _, level = name.rpartition(".")
                 if field:
                     lists[field].insert(int(level), kept[name])
-            return frame, State(**lists)
+            return frame, state_type(**lists)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return 0, None  # none, or damaged by a crash of the machine: the frames are made again from the first
 
 
-PRODUCTS = (
-    Product(
-        name="exemplar", stage="synth", folder="fields", suffix=exr, animated=False,
-        reads=("exemplar",), inputs=(), methods=("synth.motion.exemplar", "synth.field"),
-        make=make_exemplar, write=write_field, read=read_field),
-    Product(
-        name="L", stage="synth", folder="fields", suffix=exr,
-        reads=("coarse", "seed", "fps"), inputs=(), methods=("synth.motion.coarse", "synth.field"),
-        make=make_coarse, write=write_field, read=read_field),
-    Product(
-        name="H", stage="synth", folder="fields", suffix=exr,
-        reads=("detail", "seed", "fps"), inputs=(("exemplar", "once"), ("L", "until")),
-        methods=("synth.motion.detail", "synth.motion.coarse", "synth.field"),
-        make=make_detail, write=write_field, read=read_field),
-)
+LOCAL_FRAME = ("detail.size", "detail.along", "detail.facing", "detail.directions")
+"""The keys that the coordinate transformation depends on."""
+
+
+def facing(scene: Scene, which: Frames) -> tuple[tuple[str, Frames], ...]:
+    """The input that `towards` reads, if any."""
+    return (("O", which),) if scene.dimension == 3 and scene.detail.facing == "density" else ()
+
+
+def products(scene: Scene) -> tuple[Product, ...]:
+    """The exemplars, L, the smoke O where the local frame faces out of it, and H."""
+    flat, known, out_of_smoke = scene.dimension == 2, scene.exemplars, facing(scene, "until")
+    files = ("synth.motion.exemplar", "synth.field")
+    # of one file a flat scene takes another part than one in space
+    made = [Product(
+        name=name, stage="synth", folder="fields", suffix=_exemplar_suffix(key), animated=False,
+        reads=(key, "dimension") if hasattr(value_at(scene, key), "solid") else (key,), inputs=(), methods=files,
+        make=_exemplar(key), write=write_field, read=read_field) for name, key in known.items()]
+    made.append(Product(
+        name="L", stage="synth", folder="fields", suffix=suffix,
+        reads=("coarse", "seed", "fps", *(("dimension",) if scene.coarse.kind == "file" else ())), inputs=(),
+        methods=("synth.motion.coarse", "synth.field"), make=make_coarse, write=write_velocity, read=read_field))
+    if out_of_smoke:
+        made.append(Product(
+            name="O", stage="synth", folder="fields", suffix=suffix,
+            reads=("density.sources", "density.border", "seed", "fps"), inputs=(("L", "until"),),
+            methods=("synth.motion.density", "synth.field"), make=make_smoke, write=write_field, read=read_field))
+    made.append(Product(
+        name="H", stage="synth", folder="fields", suffix=suffix,
+        reads=("detail", "seed", "fps", *(() if flat else ("views",))),
+        inputs=(*((name, "once") for name in known), ("L", "until"), *out_of_smoke),
+        methods=("synth.motion.detail" if flat else "synth.motion.solid", "synth.motion.coarse", "synth.field"),
+        make=make_detail, write=write_detail, read=read_field))
+    return tuple(made)
+
+
+def _exemplar_suffix(key: str) -> Callable[[Scene], str]:
+    def suffix_of(scene: Scene) -> str:
+        return "vdb" if scene.dimension == 3 and getattr(value_at(scene, key), "solid", False) else "exr"
+
+    return suffix_of

@@ -59,7 +59,7 @@ def _key(works: Works, frames: Any) -> str:
     shown = [works.scenes.variants[variant].figure.model_dump() for variant in works.scenes.variants]
     hashes = []
     for variant, panel in _places(works):
-        product = works.products[variant][panels.picture_of(panel)]
+        product = works.products[variant][panel.picture]
         for frame in dict.fromkeys(_frame(product.animated, works.scenes.variants[variant], f) for f in frames):
             entry = works.require(variant, product.name, frame)
             hashes.append(entry.sha256)
@@ -74,9 +74,9 @@ def _frame(animated: bool, scene: Scene, frame: int) -> int:
     return min(frame, scene.frames) if animated else 0
 
 
-def _places(works: Works) -> list[tuple[str, str]]:
+def _places(works: Works) -> list[tuple[str, panels.Shown]]:
     """(variant, panel) of the figure, in reading order."""
-    return [(variant, panel) for variant, scene in works.scenes.variants.items() for panel in scene.figure.panels]
+    return [(variant, panel) for variant, scene in works.scenes.variants.items() for panel in panels.shown(scene)]
 
 
 def sheet(works: Works, frame: int) -> np.ndarray:
@@ -87,33 +87,34 @@ def sheet(works: Works, frame: int) -> np.ndarray:
     first = next(iter(scenes.values()))
     several = len(scenes) > 1 or "" not in scenes
     shown = []
-    for variant, name in _places(works):
-        label = _label(scenes[variant], name)
+    for variant, panel in _places(works):
+        label = _label(scenes[variant], panel)
         if several:
-            alone = len(scenes[variant].figure.panels) == 1
-            label = variant if alone or name == scenes[variant].figure.panels[0] else label
-        shown.append(_panel(works, variant, name, frame, label))
-    if several and len(first.figure.panels) > 1:
-        columns = len(first.figure.panels)
+            label = variant if panel == panels.shown(scenes[variant])[0] else label
+        shown.append(_panel(works, variant, panel, frame, label))
+    if several and len(panels.shown(first)) > 1:
+        columns = len(panels.shown(first))
     else:
         columns = first.figure.columns or len(shown)
     rows = [shown[start:start + columns] for start in range(0, len(shown), columns)]
     return layout.figure(rows)
 
 
-def _label(scene: Scene, panel: str) -> str:
+def _label(scene: Scene, panel: panels.Shown) -> str:
     labels = scene.figure.labels
-    return labels[scene.figure.panels.index(panel)] if labels else LABELS[panel]
+    if labels:
+        return labels[panels.shown(scene).index(panel)]
+    return LABELS[panel.panel] + (f", {panel.view}" if panel.view else "")
 
 
-def _panel(works: Works, variant: str, name: str, frame: int, label: str) -> Any:
+def _panel(works: Works, variant: str, panel: panels.Shown, frame: int, label: str) -> Any:
     from render import film, layout, lic
 
     scene = works.scenes.variants[variant]
-    product = works.products[variant][panels.picture_of(name)]
+    product = works.products[variant][panel.picture]
     file = works.file(variant, product.name, _frame(product.animated, scene, frame))
     light = product.read(file, scene)
-    filmic = name == "result" and scene.render.kind != "ink"
+    filmic = panel.panel == "result" and scene.render.kind != "ink"
     shown = layout.fitted(film.developed(light, "filmic" if filmic else "straight"), scene.figure.panel)
-    legend = lic.wheel(scene.figure.panel // 6) if name.endswith("-colour") else None
+    legend = lic.wheel(scene.figure.panel // 6) if panel.style == "colour" else None
     return layout.Panel(shown, label, legend=legend)

@@ -7,28 +7,40 @@ alone, by any machine of a farm.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pipeline.fields import coarse_cells, exr, read_field, write_field
-from pipeline.files import volumes
+from pipeline.fields import (
+    LOCAL_FRAME,
+    coarse_cells,
+    facing,
+    read_field,
+    sources,
+    suffix,
+    towards,
+    write_field,
+    write_velocity,
+)
 from pipeline.product import Product, Stock
 from pipeline.schema import Scene
 from synth.field import Field
 
 
 def transformed(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
-    """H' (Y, X, 2): H in the domain's coordinates (§3.1, CoordinateTransform)."""
+    """H' (Y, X, 2) or (Z, Y, X, 3): H in the domain's coordinates (§3.1, CoordinateTransform)."""
     from synth.motion import frames as local
 
-    frames = local.local_frame(coarse_cells(scene, stock, frame), scene.detail.along)
-    return local.to_world(stock.read("H", frame).values, frames)
+    L, along = coarse_cells(scene, stock, frame), scene.detail.along
+    if scene.dimension == 2:
+        axes = local.local_frame(L, along)
+    else:
+        axes = local.solid_frame(L, towards(scene, stock, frame), along)
+    return local.to_world(stock.read("H", frame).values, axes)
 
 
 def final_motion(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
-    """F (Y, X, 2), cells per frame (§3.5)."""
+    """F (Y, X, 2) or (Z, Y, X, 3), cells per frame (§3.5)."""
     from synth.motion.combine import combine
 
     weight = None if scene.combine.weight == "uniform" else scene.combine.weight
@@ -39,13 +51,13 @@ def final_motion(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
 def make_final(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
     """F, world units per second."""
     for frame in frames:
-        yield frame, Field.centred(final_motion(scene, stock, frame), 2).per_second(scene.fps)
+        yield frame, Field.centred(final_motion(scene, stock, frame), scene.dimension).per_second(scene.fps)
 
 
 def _placed(scene: Scene, density: np.ndarray) -> Field:
-    """A density of the plane, in the plane or with the body that [density.depth] gives it."""
+    """A density where it was made, or one of the plane with the body that [density.depth] gives it."""
     if scene.density.depth is None:
-        return Field.centred(density, 2)
+        return Field.centred(density, scene.dimension)
     from synth.motion.depth import inflate
 
     return Field.centred(inflate(density, scene.density.depth.reach), 3)
@@ -66,21 +78,10 @@ def make_density(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tupl
         from synth.motion.density import windowed
 
         L = (stock.read("L", frame).per_frame(scene.fps).values for frame in range(1, last + 1))
-        every = windowed(L, F, _sources(scene), wanted.m, **settings)
+        every = windowed(L, F, sources(scene), wanted.m, **settings)
     for frame, values in enumerate(every, start=1):
         if frame in frames:
             yield frame, _placed(scene, values)
-
-
-def _sources(scene: Scene) -> list[Any]:
-    from synth.motion.density import Source
-
-    made = []
-    for number, source in enumerate(scene.density.sources):
-        radius = source.radius if len(source.radius) > 1 else source.radius[0]
-        settings = source.model_dump(exclude={"radius"})
-        made.append(Source(radius=radius, seed=scene.seed + number, **settings))
-    return made
 
 
 def _carried(scene: Scene, stock: Stock, frame: int) -> Any:
@@ -93,7 +94,7 @@ def _carried(scene: Scene, stock: Stock, frame: int) -> Any:
 def _naive(scene: Scene, motion: Iterator[Any], settings: dict[str, Any]) -> Iterator[np.ndarray]:
     from synth.motion.density import naive
 
-    return naive(motion, _sources(scene), **settings)
+    return naive(motion, sources(scene), **settings)
 
 
 def _single_windows(scene: Scene, stock: Stock, frames: list[int], settings: dict[str, Any],
@@ -114,25 +115,12 @@ def _window(scene: Scene, stock: Stock, O: np.ndarray | None, frame: int, settin
     from synth.motion.density import window
 
     motion = [_carried(scene, stock, i) for i in range(max(frame - scene.density.m, 0) + 1, frame + 1)]
-    values = window(O, motion, _sources(scene), frame, **settings)
+    values = window(O, motion, sources(scene), frame, **settings)
     return _placed(scene, values)
 
 
-def _suffix(scene: Scene) -> str:
-    return "exr" if scene.density.depth is None else "vdb"
-
-
-def write_density(file: Path, field: Field, scene: Scene) -> None:
-    """Write a density: 2-D as EXR, 3-D as VDB grid `density`."""
-    if field.dimension == 2:
-        write_field(file, field, scene)
-    else:
-        volumes.write(file, {"density": field})
-
-
-def read_density(file: Path, scene: Scene) -> Field:
-    """Read a density that `write_density` wrote."""
-    return read_field(file, scene) if scene.density.depth is None else volumes.read(file)["density"]
+def _density_suffix(scene: Scene) -> str:
+    return suffix(scene) if scene.density.depth is None else "vdb"
 
 
 TRANSFORM = ("synth.motion.combine", "synth.motion.frames", "synth.field")
@@ -141,13 +129,13 @@ TRANSFORM = ("synth.motion.combine", "synth.motion.frames", "synth.field")
 def products(scene: Scene) -> tuple[Product, ...]:
     """F; and the density, unless nothing renders it."""
     final = Product(
-        name="F", stage="bake", folder="geometry", suffix=exr, reads=("combine", "detail.size", "detail.along", "fps"),
-        inputs=(("L", "same"), ("H", "same")), methods=TRANSFORM,
-        make=make_final, write=write_field, read=read_field)
+        name="F", stage="bake", folder="geometry", suffix=suffix, reads=("combine", *LOCAL_FRAME, "fps"),
+        inputs=(("L", "same"), ("H", "same"), *facing(scene, "same")), methods=TRANSFORM,
+        make=make_final, write=write_velocity, read=read_field)
     density = Product(
-        name="density", stage="bake", folder="geometry", suffix=_suffix,
-        reads=("density", "combine", "detail.size", "detail.along", "seed", "fps"),
-        inputs=(("L", "until"), ("H", "until")),
-        methods=("synth.motion.density", "synth.motion.depth", *TRANSFORM), make=make_density, write=write_density,
-        read=read_density)
+        name="density", stage="bake", folder="geometry", suffix=_density_suffix,
+        reads=("density", "combine", *LOCAL_FRAME, "seed", "fps"),
+        inputs=(("L", "until"), ("H", "until"), *facing(scene, "until")),
+        methods=("synth.motion.density", "synth.motion.depth", *TRANSFORM), make=make_density, write=write_field,
+        read=read_field)
     return (final,) if scene.render.kind == "none" else (final, density)

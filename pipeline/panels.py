@@ -7,15 +7,17 @@ were made as display values and are stored so that `straight` development gives 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipeline import geometry
+from pipeline.fields import LOCAL_FRAME, facing
 from pipeline.files import images, pictures
-from pipeline.product import Frames, Product, Stock
-from pipeline.schema import Scene
+from pipeline.product import Frames, Product, Stock, value_at
+from pipeline.schema import Scene, is_of_exemplar
 
 ARROWS = 9  # across a picture
 
@@ -54,43 +56,90 @@ def make_beauty(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
                         denoised=settings.denoised, extinction=settings.extinction, bowl=settings.bowl))
 
 
-def make_input(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
-    """The exemplar as figure 4 shows it: a bitmap itself, the colours of any other."""
-    from render import film, lic
+@dataclass(frozen=True)
+class Shown:
+    """A panel of the figure: what the scene calls it, and which exemplar it is of where there are several."""
 
-    width = scene.figure.panel
-    if scene.exemplar.kind in ("bitmap", "drawing") and scene.exemplar.file.suffix != ".svg":
-        picture = pictures.read_foreign(scene.exemplar.file, "exemplar.file")
-        yield 0, film.decoded(np.clip(pictures.resized(picture, width, lic.height_for(picture.shape, width)), 0, 1))
-    else:
-        yield 0, film.decoded(lic.colour(stock.read("exemplar").values, width))
+    panel: str
+    exemplar: str = "exemplar"
+
+    @property
+    def view(self) -> str:
+        """The view that first shows its exemplar: front … or a number; "" if there is one exemplar."""
+        return self.exemplar.removeprefix("exemplar").removeprefix("-")
+
+    @property
+    def style(self) -> str:
+        """Lines, colour or arrows."""
+        return self.panel.partition("-")[2] or "lines"
+
+    @property
+    def picture(self) -> str:
+        """The product that it shows."""
+        if self.panel == "result":
+            return "beauty"
+        what = self.panel.partition("-")[0]
+        named = f"{what}-{self.view}" if self.view else what
+        return named if what == "input" else f"{named}-{self.style}"
 
 
-def field_values(name: str, scene: Scene, stock: Stock, frame: int) -> np.ndarray:
-    """The field that panel `name` shows, any unit."""
-    match name:
-        case "exemplar":
-            return stock.read("exemplar").values
+def shown(scene: Scene) -> list[Shown]:
+    """The panels of the scene's figure, from left to right."""
+    return [Shown(panel, name) for panel in scene.figure.panels
+            for name in (scene.exemplars if is_of_exemplar(panel) else ["exemplar"])]
+
+
+def make_input(panel: Shown) -> Callable[[Scene, Stock, list[int]], Iterator[tuple[int, np.ndarray]]]:
+    """Makes an exemplar as figure 4 shows it: a bitmap itself, the colours of any other."""
+
+    def make(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+        from render import film, lic
+
+        width, key = scene.figure.panel, scene.exemplars[panel.exemplar]
+        exemplar: Any = value_at(scene, key)
+        if exemplar.kind in ("bitmap", "drawing") and exemplar.file.suffix != ".svg":
+            picture = pictures.read_foreign(exemplar.file, f"{key}.file")
+            height = lic.height_for(picture.shape, width)
+            yield 0, film.decoded(np.clip(pictures.resized(picture, width, height), 0, 1))
+        else:
+            yield 0, film.decoded(lic.colour(field_values(panel, scene, stock, 0), width))
+
+    return make
+
+
+def field_values(panel: Shown, scene: Scene, stock: Stock, frame: int) -> np.ndarray:
+    """The field that a panel shows (Y, X, 2), any unit; of one in space the middle slice along figure.plane."""
+    match panel.panel.partition("-")[0]:
+        case "exemplar" | "input":
+            values = stock.read(panel.exemplar).values
         case "coarse":
-            return stock.read("L", frame).values
+            values = stock.read("L", frame).values
         case "detail":
-            return geometry.transformed(scene, stock, frame)
+            values = geometry.transformed(scene, stock, frame)
         case _:
-            return stock.read("F", frame).values
+            values = stock.read("F", frame).values
+    return _flat(values, scene)
 
 
-def maker(name: str, style: str) -> Callable[[Scene, Stock, list[int]], Iterator[tuple[int, np.ndarray]]]:
-    """Makes the pictures of field `name` in `style`: lines, colour or arrows."""
+def _flat(values: np.ndarray, scene: Scene) -> np.ndarray:
+    from render import lic
+
+    return values if values.ndim == 3 else lic.slice_of(values, scene.figure.plane)
+
+
+def maker(panel: Shown) -> Callable[[Scene, Stock, list[int]], Iterator[tuple[int, np.ndarray]]]:
+    """Makes the pictures of a field: lines, colour or arrows."""
 
     def make(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
         from render import film, lic
 
         width = scene.figure.panel
         for frame in frames:
-            values = field_values(name, scene, stock, frame)
-            shown = lic.colour(values, width) if style == "colour" else lic.picture(values, width, scene.seed)
-            if style == "arrows":
-                wrong = stock.read("H", frame).values if name == "detail" else None
+            values = field_values(panel, scene, stock, frame)
+            shown = lic.colour(values, width) if panel.style == "colour" else lic.picture(values, width, scene.seed)
+            if panel.style == "arrows":
+                detail = panel.panel.startswith("detail")
+                wrong = _flat(stock.read("H", frame).values, scene) if detail else None
                 shown = with_arrows(shown, values, wrong)
             yield frame, film.decoded(shown)
 
@@ -109,31 +158,31 @@ def with_arrows(picture: np.ndarray, right: np.ndarray, wrong: np.ndarray | None
     return picture
 
 
-INPUTS: dict[str, tuple[tuple[str, Frames], ...]] = {
-    "exemplar": (("exemplar", "once"),),
-    "coarse": (("L", "same"),),
-    "detail": (("L", "same"), ("H", "same")),
-    "combined": (("F", "same"),),
-}
-
-
-def picture_of(panel: str) -> str:
-    """The product that a panel of the figure shows."""
-    names = {"result": "beauty", "input": "input"}
-    return names.get(panel) or (panel if "-" in panel else f"{panel}-lines")
-
-
 def products(scene: Scene) -> tuple[Product, ...]:
     """The pictures that the scene's figure shows, and the smoke."""
     made = [_smoke()] if scene.render.kind != "none" else []
-    for panel in dict.fromkeys(scene.figure.panels):
-        if panel == "input":
-            made.append(_picture(panel, make_input, ("exemplar", "figure.panel"), INPUTS["exemplar"], False))
-        elif panel != "result":
-            name, _, style = picture_of(panel).partition("-")
-            transform = ("detail.size", "detail.along") if name == "detail" else ()
-            made.append(_picture(picture_of(panel), maker(name, style), ("figure.panel", "seed", *transform),
-                                 INPUTS[name], name != "exemplar"))
+    for panel in dict.fromkeys(shown(scene)):
+        if panel.panel == "result":
+            continue
+        what = panel.panel.partition("-")[0]
+        inputs: tuple[tuple[str, Frames], ...]
+        reads: tuple[str, ...] = ("figure.panel", "seed", "figure.plane")
+        match what:
+            case "input":
+                inputs, reads = ((panel.exemplar, "once"),), (scene.exemplars[panel.exemplar], *reads)
+            case "exemplar":
+                inputs = ((panel.exemplar, "once"),)
+            case "coarse":
+                inputs = (("L", "same"),)
+            case "detail":
+                inputs, reads = (("L", "same"), ("H", "same"), *facing(scene, "same")), (*reads, *LOCAL_FRAME)
+            case _:
+                inputs = (("F", "same"),)
+        make = make_input(panel) if what == "input" else maker(panel)
+        made.append(Product(
+            name=panel.picture, stage="render", folder="images", suffix=suffix, reads=reads, inputs=inputs,
+            methods=("render.lic", "render.arrows", "synth.motion.frames"), make=make, write=write_light,
+            read=read_light, animated=what not in ("input", "exemplar")))
     return tuple(made)
 
 
@@ -142,11 +191,3 @@ def _smoke() -> Product:
         name="beauty", stage="render", folder="images", suffix=suffix, reads=("render", "seed"),
         inputs=(("density", "same"),), methods=("render.smoke",), make=make_beauty, write=write_light,
         read=read_light)
-
-
-def _picture(name: str, make: Any, reads: tuple[str, ...], inputs: tuple[tuple[str, Frames], ...],
-             animated: bool) -> Product:
-    return Product(
-        name=name, stage="render", folder="images", suffix=suffix, reads=reads, inputs=inputs,
-        methods=("render.lic", "render.arrows", "synth.motion.frames"), make=make, write=write_light,
-        read=read_light, animated=animated)

@@ -69,17 +69,20 @@ class Product:
 
     def reads_files(self, scene: Scene) -> bool:
         """Whether its content depends on files that the scene names."""
-        return any(isinstance(getattr(_at(scene, key), "file", None), Path) for key in self.reads)
+        return any(isinstance(getattr(value_at(scene, key), "file", None), Path) for key in self.reads)
 
     def tables(self, scene: Scene) -> dict[str, Any]:
         """The values of `reads`, files by their content."""
-        return {key: _plain(_at(scene, key)) for key in self.reads}
+        return {key: _plain(value_at(scene, key)) for key in self.reads}
 
 
-def _at(scene: Scene, key: str) -> Any:
+def value_at(scene: Scene, key: str) -> Any:
+    """The value of a dotted key, `views[0].exemplar`; None where a table has not the key."""
     value: Any = scene
     for part in key.split("."):
-        value = getattr(value, part, None)
+        name, _, number = part.rstrip("]").partition("[")
+        value = getattr(value, name, None)
+        value = value[int(number)] if number else value
     return value
 
 

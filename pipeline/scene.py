@@ -25,7 +25,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from pipeline.errors import BadInput
-from pipeline.schema import Scene, View
+from pipeline.schema import Scene, View, is_of_exemplar
 
 Raw = Mapping[str, Any]
 FLAT = ("lit", "ink")  # kinds of [render] that draw a plane
@@ -260,6 +260,8 @@ def _flat_and_deep(scene: Scene) -> Faults:
     for number, direction in enumerate(detail.directions):
         if not any(direction.vector):
             yield f"detail.directions[{number}].vector", "is zero: it faces nowhere"
+        if direction.at in [other.at for other in detail.directions[:number]]:
+            yield f"detail.directions[{number}].at", "is the place of one before it"
 
 
 def _exemplar(scene: Scene) -> Faults:
@@ -341,8 +343,9 @@ def _shown(scene: Scene) -> Faults:
     figure = scene.figure
     if figure.frame > scene.frames:
         yield "figure.frame", f"the animation has {scene.frames} frames"
-    if figure.labels and len(figure.labels) != len(figure.panels):
-        yield "figure.labels", f"{len(figure.labels)} labels for {len(figure.panels)} panels"
+    panels = sum(len(scene.exemplars) if is_of_exemplar(panel) else 1 for panel in figure.panels)
+    if figure.labels and len(figure.labels) != panels:
+        yield "figure.labels", f"{len(figure.labels)} labels for {panels} panels"
     if "result" in figure.panels and scene.render.kind == "none":
         yield "figure.panels", 'there is no "result" with render.kind = "none"'
 

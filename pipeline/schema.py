@@ -179,6 +179,10 @@ def _neighborhoods(table: dict[str, Any]) -> tuple[int, ...]:
     return (9,) if len(table.get("size", ())) == 3 else (17, 9)
 
 
+def _search(table: dict[str, Any]) -> str:
+    return "k-coherence" if len(table.get("size", ())) == 3 else "exact"
+
+
 class Detail(Table):
     """The synthesis of H (§3.1 to 3.4, 3.7)."""
 
@@ -189,7 +193,7 @@ class Detail(Table):
         "widths, odd, in the order used (§4: 17² followed by 9²; 9² in 3-D)", _neighborhoods, "cells",
         min_length=1, max_length=4)
     iterations: int = key("of search and assignment with each width (§4: 3 to 5)", 4, ge=1, le=50)
-    search: Literal["exact", "k-coherence"] = key("exact, or k-coherence (§3.7)", "exact")
+    search: Literal["exact", "k-coherence"] = key("exact, or k-coherence (§3.7)", _search)
     k: int = key("candidates of k-coherence", 4, ge=1, le=32)
     along: Literal["x", "y"] = key("the exemplar's axis that follows L (§3.3); \"y\": upright motifs rise upright", "x")
     facing: Literal["camera", "density", "directions"] = key(
@@ -199,9 +203,17 @@ class Detail(Table):
         "an array of tables [[detail.directions]], for facing = \"directions\"", (), max_length=256)
 
 
-PLANES = {"front": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "side": ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
-          "top": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))}
+Triple = tuple[float, float, float]
+PLANES: dict[str, tuple[Triple, Triple]] = {
+    "front": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+    "side": ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+    "top": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))}
 """The planes of views: the exemplar's x and y axis in the local frame."""
+
+
+def _triple(vector: tuple[float, ...] | None) -> Triple:
+    x, y, z = vector or (0.0, 0.0, 0.0)
+    return x, y, z
 
 
 class View(Table):
@@ -220,9 +232,9 @@ class View(Table):
         "its own, a table with the keys of [exemplar]; none: that one", None)
 
     @property
-    def axes(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    def axes(self) -> tuple[Triple, Triple]:
         """Right and up, as they are written."""
-        return PLANES[self.plane] if self.plane else (self.right or (), self.up or ())
+        return PLANES[self.plane] if self.plane else (_triple(self.right), _triple(self.up))
 
 
     @property
@@ -320,9 +332,14 @@ Panel = Literal["input", "exemplar", "exemplar-colour", "exemplar-arrows", "coar
                 "detail-colour", "detail-arrows", "combined", "combined-colour", "result"]
 
 
+def is_of_exemplar(panel: str) -> bool:
+    """Whether there are as many of a panel as there are exemplars."""
+    return panel.partition("-")[0] in ("input", "exemplar")
+
+
 class Figure(Table):
     """The panels of X.png and X.mp4. With several variants and one panel, one panel for each of them; with
-    several of both, one row for each variant."""
+    several of both, one row for each variant. A panel of the exemplar stands once for each exemplar of the views."""
 
     panels: Annotated[tuple[Panel, ...], Strict(False)] = key("from left to right", ("result",), min_length=1)
     labels: Annotated[tuple[str, ...], Strict(False)] = key(
@@ -368,3 +385,18 @@ class Scene(Table):
         planes: tuple[Any, ...] = ("front",) if _solid(self.exemplar) else ("front", "side", "top")
         views = self.views or tuple(View(plane=plane) for plane in planes)
         return tuple(view if view.exemplar else view.model_copy(update={"exemplar": self.exemplar}) for view in views)
+
+    @property
+    def exemplars(self) -> dict[str, str]:
+        """The names of the exemplars, and the key of each: exemplar, or where the views of a 3-D scene have several
+        exemplar-front, exemplar-top … (after the first view that shows it; exemplar-1 … without a plane)."""
+        if self.dimension == 2:
+            return {"exemplar": "exemplar"}
+        first: dict[Any, int] = {}
+        for number, view in enumerate(self.seen):
+            first.setdefault(view.exemplar, number)
+        planes = [self.seen[number].plane for number in first.values()]
+        names = [plane if plane and planes.count(plane) == 1 else str(place) for place, plane in enumerate(planes, 1)]
+        return {f"exemplar-{name}" if len(first) > 1 else "exemplar":
+                f"views[{number}].exemplar" if self.views and self.views[number].exemplar else "exemplar"
+                for name, number in zip(names, first.values(), strict=True)}

@@ -25,7 +25,7 @@ VERBS = ("synth", "bake", "render", "figure")
 
 def products(scene: Scene) -> dict[str, Product]:
     """All products of a scene, by name, each after those it is made from."""
-    return {p.name: p for p in (*fields.PRODUCTS, *geometry.products(scene), *panels.products(scene))}
+    return {p.name: p for p in (*fields.products(scene), *geometry.products(scene), *panels.products(scene))}
 
 
 class Works:

@@ -24,11 +24,20 @@ STILL, MOVING = 0.004, 0.03  # magnitudes, as shares of the largest, between whi
 SPLINE_BORDER = 12  # cells after which a spline's coefficient has forgotten its neighbour, in float32
 
 
-def slice_of(v: np.ndarray, index: int | None = None) -> np.ndarray:
-    """The x, y components (Y, X, 2) of a 3-D field (Z, Y, X, 3) in the plane z = index (the middle one)."""
+def slice_of(v: np.ndarray, plane: str = "front") -> np.ndarray:
+    """The middle slice of a 3-D field (Z, Y, X, 3) and its components there: of x, y as (Y, X, 2) from the front, of
+    z, y as (Y, Z, 2) from the side, of x, z as (Z, X, 2) from the top."""
     if v.ndim != 4 or v.shape[3] != 3:
         raise ValueError(f"expected a field (Z, Y, X, 3), got {v.shape}")
-    return v[v.shape[0] // 2 if index is None else index, :, :, :2]
+    z, y, x = (n // 2 for n in v.shape[:3])
+    match plane:
+        case "front":
+            return v[z][..., [0, 1]]
+        case "side":
+            return v[:, :, x].swapaxes(0, 1)[..., [2, 1]]
+        case "top":
+            return v[:, y][..., [0, 2]]
+    raise ValueError(f"plane {plane!r} is none of front, side, top")
 
 
 def _checked(v: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from synth.motion.exemplar import (
     from_drawing,
     from_field,
     from_svg,
+    from_volume,
 )
 
 SIZES = (16, 32, 33, 64, 128)
@@ -202,6 +203,30 @@ def test_field():
     assert np.abs(ramp[0] - ramp[-1]).mean() < 0.2 * np.abs(np.stack([x, y])).max()
 
 
+def test_a_volume_keeps_its_axes_and_its_place() -> None:
+    cube = np.random.default_rng(1).standard_normal((16, 16, 16, 3))
+    cube /= np.linalg.norm(cube, axis=-1).max()
+    np.testing.assert_allclose(from_volume(7 * cube, 16), cube, atol=1e-6)
+    wide = np.pad(cube, ((1, 1), (4, 4), (2, 2), (0, 0)))
+    np.testing.assert_allclose(from_volume(wide, 18)[1:-1, 1:-1, 1:-1], cube, atol=1e-6)
+    blocks = cube.reshape(8, 2, 8, 2, 8, 2, 3).mean((1, 3, 5))
+    np.testing.assert_allclose(from_volume(cube, 8), blocks / np.linalg.norm(blocks, axis=-1).max(), atol=1e-6)
+    ramp = np.zeros((16, 16, 16, 3))
+    ramp[..., 2] = np.arange(16)[:, None, None]
+    ramp[..., 0] = np.sin(2 * np.pi * (np.arange(16) + 0.5) / 16)[:, None]
+    tile = from_volume(ramp, 16, toroidal=True)
+    z, x = tile[..., 2] / tile[..., 2].mean(), tile[..., 0] / tile[..., 2].mean()
+    assert abs(z[0, 8, 8] - z[-1, 8, 8]) < 0.15  # the ramp's jump of twice its mean is gone …
+    np.testing.assert_allclose(np.ptp(x), 2 / 7.5, rtol=0.15)  # … what waves stays, but for its own step there
+
+
+def test_a_volume_of_three_and_a_half_cells_to_one() -> None:
+    constant = np.broadcast_to(np.array([1.0, 2.0, -2.0]), (28, 28, 28, 3))
+    unit = np.broadcast_to([1 / 3, 2 / 3, -2 / 3], (8, 8, 8, 3))
+    np.testing.assert_allclose(from_volume(constant, 8), unit, atol=1e-6)
+
+
+
 def test_clip_finds_a_known_motion():
     """Texture that moves by (2, -1) pixels a frame, y up, gives that direction, and the same bits again."""
     noise = np.random.default_rng(1).random((96, 96))
@@ -357,6 +382,9 @@ def test_svg_refuses(text, reason):
         (lambda: from_field(np.zeros((32, 32, 2)), 16), "blank"),
         (lambda: from_field(np.full((32, 32, 2), np.inf), 16), "not finite"),
         (lambda: from_field(np.ones((32, 32, 3)), 16), "components"),
+        (lambda: from_volume(np.zeros((16, 32, 32, 3)), 16), "blank"),
+        (lambda: from_volume(np.ones((32, 32, 32, 2)), 16), "components"),
+        (lambda: from_volume(np.ones((32, 32, 7, 3)), 16), "thin"),
         (lambda: from_clip([np.eye(32)], 16), "two frames"),
         (lambda: from_clip([np.eye(32), np.eye(33)], 16), "frame 2"),
         (lambda: from_clip([np.eye(32), np.full((32, 32), np.nan)], 16), "frame 2.*not finite"),

@@ -128,7 +128,12 @@ def test_resampling_is_spline_interpolation(shape: tuple[int, ...], height: int,
 def test_slice_of_a_volume() -> None:
     volume = np.arange(5 * 3 * 4 * 3, dtype=np.float32).reshape(5, 3, 4, 3)
     assert np.array_equal(lic.slice_of(volume), volume[2, :, :, :2])
-    assert np.array_equal(lic.slice_of(volume, 4), volume[4, :, :, :2])
+    side, top = lic.slice_of(volume, "side"), lic.slice_of(volume, "top")
+    assert (side.shape, top.shape) == ((3, 5, 2), (5, 4, 2))
+    assert side[2, 4].tolist() == volume[4, 2, 2, [2, 1]].tolist()  # y up, z to the right
+    assert top[4, 3].tolist() == volume[4, 1, 3, [0, 2]].tolist()
+    with pytest.raises(ValueError, match="plane"):
+        lic.slice_of(volume, "back")
 
 
 @pytest.mark.parametrize("bad", [np.zeros((4, 4)), np.zeros((4, 4, 3)), np.full((4, 4, 2), np.nan)])

@@ -44,11 +44,30 @@ class Fields:
         return ""
 
 
-def picture(panel: str, **tables: Any) -> np.ndarray:
+class Solid(Fields):
+    """The same in space: 8 layers of 12 rows and 16 columns."""
+
+    def __init__(self) -> None:
+        values = np.random.default_rng(2).random((8, 12, 16, 3)) - 0.5
+        self.files = {"exemplar": Field.centred(exemplar("circle", 8), 2), "L": Field.centred(values[::2, ::2, ::2], 3),
+                      "exemplar-top": Field.centred(exemplar("square", 8), 2),
+                      "exemplar-side": Field.centred(exemplar("stripes", 8), 2),
+                      "H": Field.centred(values, 3), "F": Field.centred(values[::-1], 3),
+                      "density": Field.centred(np.abs(values[..., 0]), 3)}
+
+
+SPACE: dict[str, Any] = {
+    "coarse": {"kind": "analytic", "size": [8, 6, 4]}, "detail": {"size": [16, 12, 8]},
+    "render": {"kind": "volume", "width": 24, "height": 24, "spp": 1, "denoised": False}}
+VIEWS = [{"plane": "top", "exemplar": {"kind": "square", "size": 8}},
+         {"plane": "side", "exemplar": {"kind": "stripes", "size": 8}}]
+
+
+def picture(panel: str, stock: Fields | None = None, **tables: Any) -> np.ndarray:
     """The light of a panel."""
     made = scene([panel], **tables)
-    product = next(p for p in panels.products(made) if p.name == panels.picture_of(panel))
-    (_, light), = product.make(made, Fields(), product.frames(made)[:1])
+    product = next(p for p in panels.products(made) if p.name == panels.shown(made)[0].picture)
+    (_, light), = product.make(made, stock or Fields(), product.frames(made)[:1])
     return light
 
 
@@ -63,6 +82,36 @@ def test_every_panel_there_is_has_its_picture(panel: str) -> None:
     assert light.shape == ((24, 24, 3) if panel == "result" else (32, 32, 3))
     assert np.isfinite(light).all()
     assert np.ptp(light) > 0.05
+
+
+@pytest.mark.parametrize("panel", Panel.__args__)
+@pytest.mark.parametrize("plane", ["front", "side", "top"])
+def test_every_panel_has_its_picture_in_space(panel: str, plane: str) -> None:
+    shape = {"front": (24, 32, 3), "side": (48, 32, 3), "top": (16, 32, 3)}[plane]
+    light = picture(panel, Solid(), **SPACE, figure={"panels": [panel], "panel": 32, "plane": plane})
+    assert light.shape == ((24, 24, 3) if panel == "result" else (32, 32, 3) if panel[:2] in ("ex", "in") else shape)
+    assert np.isfinite(light).all()
+    assert np.ptp(light) > 0.05
+
+
+def test_in_space_the_middle_slice_is_shown() -> None:
+    combined = Solid().read("F").values
+    np.testing.assert_allclose(picture("combined", Solid(), **SPACE), film.decoded(lic.picture(
+        combined[4][..., :2], 32, 1)))
+    seen = picture("combined-colour", Solid(), **SPACE, figure={"panels": ["combined-colour"], "panel": 32,
+                                                                "plane": "top"})
+    np.testing.assert_allclose(seen, film.decoded(lic.colour(combined[:, 6][..., [0, 2]], 32)))
+
+
+def test_each_exemplar_of_the_views_has_a_panel() -> None:
+    made = scene(["exemplar", "input", "coarse"], **SPACE, views=VIEWS)
+    assert [panel.picture for panel in panels.shown(made)] == [
+        "exemplar-top-lines", "exemplar-side-lines", "input-top", "input-side", "coarse-lines"]
+    products = {p.name: p for p in panels.products(made)}
+    (_, light), = products["exemplar-side-lines"].make(made, Solid(), [0])
+    np.testing.assert_allclose(light, film.decoded(lic.picture(exemplar("stripes", 8), 32, 1)))
+    (_, light), = products["input-top"].make(made, Solid(), [0])
+    np.testing.assert_allclose(light, film.decoded(lic.colour(exemplar("square", 8), 32)))
 
 
 def test_only_what_is_shown_is_made_and_the_smoke() -> None:

@@ -1,6 +1,6 @@
 """Motion exemplars I: the small fields whose detail the synthesis spreads (ma09 §4, figures 1, 2, 4 and 9).
 
-Every function returns an (N, N, 2) float32 array: components x, y; row 0 is the bottom (y up); the longest
+Every function but one returns an (N, N, 2) float32 array: components x, y; row 0 is the bottom (y up); the longest
 vector has length 1; the tile is sampled toroidally by the synthesis. Only arrays come in, bottom row first:
 files are read elsewhere.
 
@@ -8,6 +8,7 @@ files are read elsewhere.
     from_bitmap   the curl of grey values
     from_drawing  along the strokes of a picture         from_svg   along the paths of a vector drawing
     from_field    a field made elsewhere                 from_clip  optical flow of a film clip
+    from_volume   a field in space made elsewhere, (N, N, N, 3), for synthesis from 3-D to 3-D
 
 The procedural kinds are curls of a potential, v = curl ψ = (∂ψ/∂y, -∂ψ/∂x), so their flow lines are the level
 sets of ψ and they have no sources or sinks. The potential of a closed motif is a smooth bump of the shape's
@@ -176,23 +177,24 @@ def _fourier_curl(psi: Floats, size: int, blur: float) -> Floats:
 
 
 def _periodic(u: Floats) -> Floats:
-    """The periodic part of u (Y, X): u less the smoothest function with u's jumps across the border.
+    """The periodic part of u (Y, X) or (Z, Y, X): u less the smoothest function with u's jumps across the border.
 
     L. Moisan, "Periodic plus smooth image decomposition", J. Math. Imaging Vision 39 (2011), eq. 10 to 12.
     """
     jump = np.zeros_like(u)
-    jump[0] += u[0] - u[-1]
-    jump[-1] -= u[0] - u[-1]
-    jump[:, 0] += u[:, 0] - u[:, -1]
-    jump[:, -1] -= u[:, 0] - u[:, -1]
+    for axis in range(u.ndim):
+        first, last = (np.moveaxis(jump, axis, 0)[end] for end in (0, -1))  # views: jump itself is added to
+        step = np.take(u, 0, axis) - np.take(u, -1, axis)
+        first += step
+        last -= step
     laplacian = sum(
-        2 * np.cos(2 * np.pi * np.fft.fftfreq(n)).reshape((-1, 1) if axis == 0 else (1, -1)) - 2
+        2 * np.cos(2 * np.pi * np.fft.fftfreq(n)).reshape([-1 if a == axis else 1 for a in range(u.ndim)]) - 2
         for axis, n in enumerate(u.shape)
     )
-    spectrum = np.fft.fft2(jump)
-    laplacian[0, 0] = 1
-    spectrum[0, 0] = 0
-    return u + np.fft.ifft2(spectrum / laplacian).real
+    spectrum = np.fft.fftn(jump)
+    laplacian[(0,) * u.ndim] = 1
+    spectrum[(0,) * u.ndim] = 0
+    return u + np.fft.ifftn(spectrum / laplacian).real
 
 
 def from_field(values: ArrayLike, size: int, toroidal: bool = False) -> Array:
@@ -215,6 +217,40 @@ def from_field(values: ArrayLike, size: int, toroidal: bool = False) -> Array:
         smaller = v.shape[0] > size
         v = cv2.resize(v, (size, size), interpolation=cv2.INTER_AREA if smaller else cv2.INTER_LINEAR)
     return _unit(v)
+
+
+def from_volume(values: ArrayLike, size: int, toroidal: bool = False) -> Array:
+    """A field in space made elsewhere: its central cube, resampled (linear; means of volume when smaller).
+
+    values: (Z, Y, X, 3), components x, y, z, any unit; `toroidal` as in `from_field`.
+
+    Returns (size, size, size, 3) float32. Raises ValueError for a field that is blank, not finite or tiny.
+    """
+    _check_size(size)
+    v = _checked(values, 4, "the field")
+    if v.shape[3] != 3:
+        raise ValueError(f"the field has {v.shape[3]} components; an exemplar in space has 3")
+    side = min(v.shape[:3])
+    if side < SMALLEST:
+        raise ValueError(f"the field is {side} cells thin; at least {SMALLEST} a side")
+    z, y, x = ((n - side) // 2 for n in v.shape[:3])
+    v = v[z : z + side, y : y + side, x : x + side]
+    if toroidal:
+        v = np.stack([_periodic(v[..., c]) for c in range(3)], axis=-1)
+    weights = _resampling(side, size)
+    for axis in range(3):
+        v = np.moveaxis(np.tensordot(weights, v, (1, axis)), 0, axis)
+    return _unit(v)
+
+
+def _resampling(side: int, size: int) -> Floats:
+    """(size, side) weights of the cells of one axis in those of another of the same extent."""
+    if size >= side:
+        return np.stack([np.interp((np.arange(size) + 0.5) * side / size - 0.5, np.arange(side), cell)
+                         for cell in np.eye(side)], axis=1)
+    edges, cells = np.arange(size + 1)[:, None] * side / size, np.arange(side)
+    covered = np.clip(edges, cells, cells + 1)
+    return np.diff(covered, axis=0) * size / side
 
 
 def from_clip(frames: Iterable[ArrayLike], size: int) -> Array:
