@@ -159,6 +159,13 @@ def mitsuba(variant: str) -> Any:
     return _load(variant, library)
 
 
+def drjit() -> Any:
+    """The drjit module that a loaded `mitsuba` computes with."""
+    import drjit as loaded
+
+    return loaded
+
+
 def versions(variant: str) -> dict[str, str]:
     """What a rendered picture's bits depend on: the variant, Mitsuba, Dr.Jit and (llvm variants) LLVM."""
     loaded = mitsuba(variant)
