@@ -1,12 +1,14 @@
-"""What bake makes, in out/X/geometry: the final motion F and the smoke density, in world units.
+"""What bake makes, in out/X/geometry: the final motion F, and what it moves, the smoke density or the blades of
+seaweed; in world units.
 
-The density is carried by F as it is computed from L and H, not by the files of F: so any frame can be baked
-alone, by any machine of a farm.
+These are moved by F as it is computed from L and H, not by the files of F: so any frame can be baked alone, by any
+machine of a farm.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,7 @@ from pipeline.fields import (
     write_field,
     write_velocity,
 )
+from pipeline.files import meshes
 from pipeline.product import Product, Stock
 from pipeline.schema import Scene
 from synth.field import Field
@@ -119,6 +122,44 @@ def _window(scene: Scene, stock: Stock, O: np.ndarray | None, frame: int, settin
     return _placed(scene, values)
 
 
+def _ply(scene: Scene) -> str:
+    return "ply"
+
+
+Mesh = dict[str, np.ndarray]
+
+
+def make_blades(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Mesh]]:
+    """The blades as one mesh, as `meshes.write` takes it. Each frame is made of F of its window alone."""
+    from synth import blades
+
+    wanted = scene.blades
+    width, _, depth = (cells / scene.detail.size[1] for cells in scene.detail.size)
+    plants = blades.bed(width, depth, wanted.height, wanted.spacing, wanted.cover, scene.seed)
+    motion: dict[int, Field] = {}
+    for frame in frames:
+        window = range(max(frame - wanted.window, 0) + 1, frame + 1)
+        motion = {i: motion[i] if i in motion else _motion(scene, stock, i) for i in window}
+        before = [motion[window[0]]] * (wanted.window - len(window))  # it moved so before the first frame
+        spines = blades.spines(plants, [*before, *motion.values()], wanted.bend)
+        yield frame, dict(zip(("vertices", "faces", "colours"), blades.ribbons(plants, spines), strict=True))
+
+
+def _motion(scene: Scene, stock: Stock, frame: int) -> Field:
+    """F, world units per second."""
+    return Field.centred(final_motion(scene, stock, frame), 3).per_second(scene.fps)
+
+
+def write_mesh(file: Path, mesh: Mesh, scene: Scene) -> None:
+    """Write a mesh."""
+    meshes.write(file, **mesh)
+
+
+def read_mesh(file: Path, scene: Scene) -> Mesh:
+    """Read a mesh that `write_mesh` wrote."""
+    return meshes.read_own(file)
+
+
 def _density_suffix(scene: Scene) -> str:
     return suffix(scene) if scene.density.depth is None else "vdb"
 
@@ -127,7 +168,7 @@ TRANSFORM = ("synth.motion.combine", "synth.motion.frames", "synth.field")
 
 
 def products(scene: Scene) -> tuple[Product, ...]:
-    """F; and the density, unless nothing renders it."""
+    """F; and what is rendered: the density, the blades or nothing."""
     final = Product(
         name="F", stage="bake", folder="geometry", suffix=suffix, reads=("combine", *LOCAL_FRAME, "fps"),
         inputs=(("L", "same"), ("H", "same"), *facing(scene, "same")), methods=TRANSFORM,
@@ -138,4 +179,10 @@ def products(scene: Scene) -> tuple[Product, ...]:
         inputs=(("L", "until"), ("H", "until"), *facing(scene, "until")),
         methods=("synth.motion.density", "synth.motion.depth", *TRANSFORM), make=make_density, write=write_field,
         read=read_field)
-    return (final,) if scene.render.kind == "none" else (final, density)
+    blades = Product(
+        name="blades", stage="bake", folder="geometry", suffix=_ply,
+        reads=("blades", "combine", *LOCAL_FRAME, "seed", "fps"),
+        inputs=(("L", "until"), ("H", "until"), *facing(scene, "until")), methods=("synth.blades", *TRANSFORM),
+        make=make_blades, write=write_mesh, read=read_mesh)
+    moved = {"none": (), "seaweed": (blades,)}
+    return (final, *moved.get(scene.render.kind, (density,)))

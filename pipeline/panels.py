@@ -1,4 +1,4 @@
-"""What render makes, in out/X/images: the smoke, and a picture of each field that the figure shows.
+"""What render makes, in out/X/images: the smoke or the seaweed, and a picture of each field that the figure shows.
 
 All are linear Rec.709 EXR, top row first. `beauty` is light, toned when the figure is set; pictures of fields
 were made as display values and are stored so that `straight` development gives these back.
@@ -54,6 +54,16 @@ def make_beauty(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
                     density.values, density.voxel_size, density.origin, smoke.VolumeSettings(
                         width=settings.width, height=settings.height, spp=settings.spp, seed=scene.seed,
                         denoised=settings.denoised, extinction=settings.extinction, bowl=settings.bowl))
+
+
+def make_seaweed(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The blades under water."""
+    from render import seaweed
+
+    wanted: Any = scene.render
+    for frame in frames:
+        yield frame, seaweed.picture(**stock.read("blades", frame), settings=seaweed.Settings(
+            width=wanted.width, height=wanted.height, spp=wanted.spp, seed=scene.seed, time=frame / scene.fps))
 
 
 @dataclass(frozen=True)
@@ -159,8 +169,8 @@ def with_arrows(picture: np.ndarray, right: np.ndarray, wrong: np.ndarray | None
 
 
 def products(scene: Scene) -> tuple[Product, ...]:
-    """The pictures that the scene's figure shows, and the smoke."""
-    made = [_smoke()] if scene.render.kind != "none" else []
+    """The pictures that the scene's figure shows, and the smoke or the seaweed."""
+    made = {"none": [], "seaweed": [_seaweed()]}.get(scene.render.kind, [_smoke()])
     for panel in dict.fromkeys(shown(scene)):
         if panel.panel == "result":
             continue
@@ -190,4 +200,11 @@ def _smoke() -> Product:
     return Product(
         name="beauty", stage="render", folder="images", suffix=suffix, reads=("render", "seed"),
         inputs=(("density", "same"),), methods=("render.smoke",), make=make_beauty, write=write_light,
+        read=read_light)
+
+
+def _seaweed() -> Product:
+    return Product(
+        name="beauty", stage="render", folder="images", suffix=suffix, reads=("render", "seed", "fps"),
+        inputs=(("blades", "same"),), methods=("render.seaweed",), make=make_seaweed, write=write_light,
         read=read_light)

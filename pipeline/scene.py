@@ -246,6 +246,8 @@ def _flat_and_deep(scene: Scene) -> Faults:
         for number, source in enumerate(density.sources):
             if len(source.centre) != 2:
                 yield f"density.sources[{number}].centre", need
+        if render.kind == "seaweed":
+            yield "render.kind", f'"seaweed" {need}'
         if (density.depth is not None) != (render.kind == "volume") and render.kind != "none":
             need = "needs a [density.depth]" if render.kind == "volume" else "draws no volume, but density.depth is"
             yield "render.kind", f'"{render.kind}" {need}'

@@ -293,6 +293,17 @@ class Density(Table):
     depth: Depth | None = key("makes the density a volume, for [render] kind = \"volume\"", None)
 
 
+class Blades(Table):
+    """A bed of seaweed that F bends (§4, figure 9: "use that to direct the movements of points on the seaweed
+    polygonal models"); for fields in space."""
+
+    height: float = key("of the tallest blade", 0.95, "heights", gt=0, le=2)
+    spacing: float = key("least distance of two plants", 0.13, "heights", ge=0.03, le=2)
+    cover: Share = key("of the floor that plants stand on, in patches", 0.5)
+    bend: float = key("tangent of the angle by which a flow of one height per second bends a tip", 2.0, ge=0, le=100)
+    window: int = key("whose motion a tip follows; half of it is its lag", 9, "frames", ge=1, le=100)
+
+
 class LitRender(Table):
     """2-D smoke, lit in its own plane."""
 
@@ -319,6 +330,15 @@ class VolumeRender(Table):
     extinction: float = key("of smoke of density 1", 110.0, "per height", gt=0, le=10000)
     bowl: Annotated[tuple[Share, Share], Strict(False)] | None = key(
         "radius and height of the bowl that the plume rises from", None, "heights")
+
+
+class SeaweedRender(Table):
+    """The blades under water, path-traced by Mitsuba."""
+
+    kind: Literal["seaweed"] = key("blades under water")
+    width: int = key("of the picture", 960, "pixels", ge=16, le=LARGEST)
+    height: int = key("of the picture", 540, "pixels", ge=16, le=LARGEST)
+    spp: int = key("paths per pixel", 64, ge=1, le=65536)
 
 
 class NoRender(Table):
@@ -366,7 +386,8 @@ class Scene(Table):
     detail: Detail = Detail()
     combine: Combine
     density: Density = Density()
-    render: LitRender | InkRender | VolumeRender | NoRender = Field(discriminator="kind")
+    blades: Blades = Blades()
+    render: LitRender | InkRender | VolumeRender | SeaweedRender | NoRender = Field(discriminator="kind")
     figure: Figure = Figure()
 
     @property

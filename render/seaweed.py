@@ -9,6 +9,7 @@ World units: floor at y = 0, the bed about one unit high, centred on x = z = 0.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -123,7 +124,8 @@ def caustics(time: float, seed: int) -> np.ndarray:
     return (light / light.mean()).astype(np.float32)
 
 
-def _mesh(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, bsdf: dict[str, Any]) -> Any:
+def _mesh(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray,
+          bsdf: dict[str, Any]) -> Any:
     """A Mitsuba mesh with smooth normals and a colour (N, 3), linear, at each vertex."""
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict(bsdf)
@@ -143,7 +145,7 @@ def normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Unit normals (N, 3) float32 of the vertices: of the triangles round each, by their area."""
     a, b, c = (vertices[faces[:, corner]].astype(np.float64) for corner in range(3))
     of_face = np.cross(b - a, c - a)
-    total = np.stack([np.bincount(faces.ravel(), np.repeat(of_face[:, axis], 3), len(vertices)) for axis in range(3)], 1)
+    total = np.stack([np.bincount(faces.ravel(), np.repeat(along, 3), len(vertices)) for along in of_face.T], 1)
     return (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-30)).astype(np.float32)
 
 
@@ -169,25 +171,33 @@ def _sky(mi: Any) -> dict[str, Any]:
 
 
 def _sand(mi: Any) -> Any:
-    """A floor of ripples and low mounds that ends in the blue; its mean height is 0 and it stays below 0.02."""
-    columns, rows = SAND_CELLS
-    # close to the eye the cells are small
-    x = np.linspace(-1, 1, columns) * 6.5
-    z = 4.2 - 11.0 * np.linspace(0, 1, rows) ** 1.35
-    x, z = np.meshgrid(x, z)
-    warp = gradient_noise([x / 1.3, z / 1.3], 11)
-    ripple = np.sin(2 * np.pi * (z * 0.35 + x * 0.94 + 0.28 * warp) / 0.105 + 2.2 * gradient_noise([x / 0.4, z / 0.4], 12))
-    strength = np.clip(0.6 + 0.7 * gradient_noise([x / 0.9, z / 0.9], 13), 0.1, 1)
-    height = 0.0042 * strength * (ripple + 0.25 * np.cos(2 * np.arcsin(np.clip(ripple, -1, 1))))
-    height += 0.010 * gradient_noise([x / 0.8, z / 0.8], 14) + 0.0012 * gradient_noise([x / 0.03, z / 0.03], 15)
-    grain = 1 + 0.10 * gradient_noise([x / 0.02, z / 0.02], 16) + 0.16 * gradient_noise([x / 0.6, z / 0.6], 17)
-    colours = np.clip(SAND * (grain + 9.0 * (height - 0.004))[..., None], 0.02, 0.9)
-    vertices = np.stack([x, height, z], -1).reshape(-1, 3)
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    faces = np.stack([corner, corner + 1, corner + columns + 1, corner, corner + columns + 1, corner + columns], 1)
     paint = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {
         "type": "mesh_attribute", "name": "vertex_color"}}}
-    return _mesh(mi, "sand", vertices, faces.reshape(-1, 3), colours.reshape(-1, 3), paint)
+    return _mesh(mi, "sand", *sand(), paint)
+
+
+@functools.cache
+def sand() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A floor of ripples and low mounds that ends in the blue: vertices, faces, linear colours as `_mesh` takes them.
+
+    Its mean height is 0, and it stays below the clearance of blades.
+    """
+    columns, rows = SAND_CELLS
+    # close to the eye the cells are small
+    x, z = np.meshgrid(np.linspace(-6.5, 6.5, columns), 4.2 - 11.0 * np.linspace(0, 1, rows) ** 1.35)
+
+    def noise(size: float, seed: int) -> np.ndarray:
+        return gradient_noise([x / size, z / size], seed)
+
+    ripple = np.sin(2 * np.pi * (0.94 * x + 0.35 * z + 0.28 * noise(1.3, 11)) / 0.105 + 2.2 * noise(0.4, 12))
+    strength = np.clip(0.6 + 0.7 * noise(0.9, 13), 0.1, 1)
+    # crests are sharper than troughs
+    height = 0.0042 * strength * (ripple + 0.5 * ripple**2 - 0.25) + 0.010 * noise(0.8, 14) + 0.0012 * noise(0.03, 15)
+    grain = 1 + 0.10 * noise(0.02, 16) + 0.16 * noise(0.6, 17) + 9.0 * height
+    vertices = np.stack([x, height, z], -1).reshape(-1, 3).astype(np.float32)
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    faces = np.stack([corner, corner + 1, corner + columns + 1, corner, corner + columns + 1, corner + columns], 1)
+    return vertices, faces.reshape(-1, 3), np.clip(SAND * grain[..., None], 0.02, 0.9).reshape(-1, 3)
 
 
 def _through_water(mi: Any, sunlight: np.ndarray) -> Any:
@@ -202,7 +212,7 @@ def _through_water(mi: Any, sunlight: np.ndarray) -> Any:
     extinction = mi.Color3f(EXTINCTION)
     right, upward = _across(SUN)
 
-    class Water(mi.SamplingIntegrator):  # type: ignore[misc, name-defined]
+    class Water(mi.SamplingIntegrator):
         def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
             first = scene.ray_intersect(ray, active)
             hit = active & first.is_valid()

@@ -11,6 +11,7 @@ In the order data passes through them:
     wake        a river past a round stone [Bridson et al. 2007]
     smoke       a simulated plume [Stam 1999; Fedkiw et al. 2001]
     pyramid     image pyramids of fields
+    blades      a bed of seaweed that a motion field bends
     motion/     motion field texture synthesis (ma09)
 
 Arrays are C order float32: (Y, X[, 2]) or (Z, Y, X[, 3]), components x, y, z, row 0 the lowest, cell

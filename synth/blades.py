@@ -27,8 +27,9 @@ from synth.noise import gradient_noise
 
 SAMPLES = 28  # points of a spine
 ACROSS = np.array([-1.0, -0.55, 0.0, 0.55, 1.0])  # points across a ribbon, in half widths
-CLEARANCE = 0.012  # least height above the floor of a tip
+CLEARANCE = 0.02  # least height above the floor of a tip
 PATCH = 0.95  # size of the patches that plants stand in, world units
+KIN = 0.7  # and of those within them where one species is more common than others
 BORDER = 0.12  # free of plants along the domain's sides: a bent blade stays in the field
 
 
@@ -100,7 +101,8 @@ def bed(width: float, depth: float, height: float, spacing: float, cover: float,
         raise ValueError(f"no plant finds room on a floor of {width:g} × {depth:g} heights, {spacing:g} apart")
     grown = np.clip(0.62 + 1.3 * vigour, 0, 1)
     # a species keeps together, more or less
-    kin = gradient_noise([ground[:, 0] / 0.7 + 5.2, ground[:, 1] / 0.7 + 9.4], seed + 1) + rng.normal(0, 0.2, len(ground))
+    kin = gradient_noise([ground[:, 0] / KIN + 5.2, ground[:, 1] / KIN + 9.4], seed + 1)
+    kin += rng.normal(0, 0.2, len(ground))
     rank = (np.argsort(np.argsort(kin)) + 0.5) / len(kin)
     kind = np.searchsorted(np.cumsum([s.share for s in SPECIES])[:-1], rank)
     blades = [_plant(SPECIES[k], place, height * size, rng) for k, place, size in zip(kind, ground, grown, strict=True)]
@@ -232,7 +234,8 @@ def _outline(s: np.ndarray, belly: np.ndarray) -> np.ndarray:
     """Half width of a blade along s in [0, 1], 1 where it is broadest: a narrow stalk, a belly, a pointed tip."""
     rise = np.clip(s / belly, 0, 1)
     fall = np.clip((s - belly) / (1 - belly), 0, 1)
-    return np.where(s < belly, 0.16 + 0.84 * np.sin(0.5 * np.pi * rise) ** 1.3, np.sqrt(np.maximum(1 - fall**2.2, 1e-4)))
+    stalk, tip = 0.16 + 0.84 * np.sin(0.5 * np.pi * rise) ** 1.3, np.sqrt(np.maximum(1 - fall**2.2, 1e-4))
+    return np.where(s < belly, stalk, tip)
 
 
 def _strips(count: int, n: int) -> np.ndarray:

@@ -24,6 +24,20 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert (tmp_path / "a.ply").read_bytes() == first
 
 
+def test_colours_come_back_and_are_their_vertices(tmp_path: Path) -> None:
+    colours = np.array([[255, 0, 1], [2, 254, 3], [0, 0, 0], [9, 8, 7]], np.uint8)
+    meshes.write(tmp_path / "a.ply", VERTICES, FACES, colours)
+    back = meshes.read_own(tmp_path / "a.ply")
+    assert all(np.array_equal(back[name], a) for name, a in
+               {"vertices": VERTICES, "faces": FACES, "colours": colours}.items())
+    assert np.array_equal(meshes.read(tmp_path / "a.ply", "key")[0], VERTICES)
+    meshes.write(tmp_path / "b.ply", VERTICES, FACES)
+    assert set(meshes.read_own(tmp_path / "b.ply")) == {"vertices", "faces"}
+    for wrong in (colours[:3], colours / 255.0):
+        with pytest.raises(ValueError, match="colours are"):
+            meshes.write(tmp_path / "a.ply", VERTICES, FACES, wrong)
+
+
 @pytest.mark.parametrize(("vertices", "faces", "reason"), [
     (VERTICES, FACES + 1, "names a vertex that does not exist"),
     (VERTICES, FACES - 1, "names a vertex that does not exist"),

@@ -11,8 +11,9 @@ from pipeline.errors import BadInput, StorageFailed
 from pipeline.files import atomic, shelter
 
 
-def write(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
-    """Write vertices (N, 3) float32, world units, and triangles (M, 3) of indices into them, as binary PLY.
+def write(path: Path, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray | None = None) -> None:
+    """Write vertices (N, 3) float32, world units, and triangles (M, 3) of indices into them, as binary PLY; with
+    the vertices' colours (N, 3) uint8, sRGB, if they have any.
 
     Raises ValueError for other shapes, NaN or infinity, or an index that is no vertex; `StorageFailed` if the
     file does not read back.
@@ -20,7 +21,9 @@ def write(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
     import trimesh
 
     _require_mesh(vertices, faces)
-    mesh = trimesh.Trimesh(vertices.astype(np.float32), faces.astype(np.int32), process=False)
+    if colours is not None and (colours.shape != vertices.shape or colours.dtype != np.uint8):
+        raise ValueError(f"colours are (n, 3) uint8 for n vertices, not {colours.dtype} {colours.shape}")
+    mesh = trimesh.Trimesh(vertices.astype(np.float32), faces.astype(np.int32), process=False, vertex_colors=colours)
     with atomic.replacing(path) as temporary:
         temporary.write_bytes(mesh.export(file_type="ply", vertex_normal=False))
         try:
@@ -28,6 +31,8 @@ def write(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
         except Exception as error:  # trimesh raises anything at a file cut short
             raise StorageFailed(path, f"did not read back ({error}); is the disk full?") from error
         written = {"vertices": vertices.astype(np.float32), "faces": faces}
+        if colours is not None:
+            written["colours"] = colours
         if not all(np.array_equal(back[name], array) for name, array in written.items()):
             raise StorageFailed(path, "did not read back as it was written; is the disk full?")
 
@@ -47,7 +52,15 @@ def _parsed(path: Path) -> dict[str, Any]:
 
     with path.open("rb") as file:
         mesh = trimesh.load_mesh(file, file_type="ply", process=False)
-    return {"vertices": np.asarray(mesh.vertices, np.float32), "faces": np.asarray(mesh.faces, np.int32)}
+    found = {"vertices": np.asarray(mesh.vertices, np.float32), "faces": np.asarray(mesh.faces, np.int32)}
+    if mesh.visual.kind == "vertex":
+        found["colours"] = np.asarray(mesh.visual.vertex_colors)[:, :3]
+    return found
+
+
+def read_own(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of a file that `write` wrote, by the names of its arguments; its checksum vouches for it."""
+    return _parsed(path)
 
 
 def read(path: Path, key: str) -> tuple[np.ndarray, np.ndarray]:
