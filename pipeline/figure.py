@@ -14,7 +14,7 @@ import numpy as np
 from pipeline import manifest, panels, sources
 from pipeline.files import pictures, video
 from pipeline.progress import Progress
-from pipeline.schema import Scene
+from pipeline.schema import Scene, is_of_exemplar
 
 if TYPE_CHECKING:
     from pipeline.stages import Works
@@ -115,6 +115,16 @@ def _panel(works: Works, variant: str, panel: panels.Shown, frame: int, label: s
     file = works.file(variant, product.name, _frame(product.animated, scene, frame))
     light = product.read(file, scene)
     filmic = panel.panel == "result" and scene.render.kind != "ink"
-    shown = layout.fitted(film.developed(light, "filmic" if filmic else "straight"), scene.figure.panel)
-    legend = lic.wheel(scene.figure.panel // 6) if panel.style == "colour" else None
+    width = _width(scene, panel)
+    shown = layout.fitted(film.developed(light, "filmic" if filmic else "straight"), width)
+    legend = lic.wheel(width // 6) if panel.style == "colour" else None
     return layout.Panel(shown, label, legend=legend)
+
+
+def _width(scene: Scene, panel: panels.Shown) -> int:
+    """Pixels across a panel: figure.panel, but an exemplar is no higher than a result that is wider than high."""
+    render: Any = scene.render
+    whole = scene.figure.panel
+    if not is_of_exemplar(panel.panel) or "result" not in scene.figure.panels or not hasattr(render, "height"):
+        return whole
+    return min(whole, round(whole * render.height / render.width))

@@ -104,3 +104,18 @@ def test_without_an_animation_only_the_stills_frame_is_made(tmp_path: Path, laid
     assert (made.root / "tiny.png").is_file() and not (made.root / "tiny.mp4").exists()
     assert [file.name for file in sorted((made.root / "geometry").glob("F.*"))] == ["F.0002.exr"]
     assert len(list((made.root / "fields").glob("H.*.exr"))) == 2
+
+
+def test_an_exemplar_is_no_higher_than_a_result_that_is_wider_than_high() -> None:
+    from types import SimpleNamespace
+
+    from pipeline.panels import Shown
+
+    def width(panel: str, **render: int) -> int:
+        shown = SimpleNamespace(panels=("exemplar", "coarse", "result"), panel=320)
+        return figure._width(SimpleNamespace(figure=shown, render=SimpleNamespace(**render)), Shown(panel))
+
+    wide = {"width": 960, "height": 540}
+    assert (width("exemplar", **wide), width("coarse", **wide), width("result", **wide)) == (180, 320, 320)
+    assert width("exemplar", width=512, height=640) == 320
+    assert width("exemplar", width=512) == 320
