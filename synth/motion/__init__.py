@@ -13,6 +13,7 @@ In the order data passes through them:
     detail        all of these, level by level and frame by frame (pseudocode 1 and 2)
     solid         the same in three dimensions, from views (§3.2)
     potential     as detail, of the potential of H: free of divergence (§3.6, Discussion)
+    lagrangian    as detail, at samples that move with the flow (§5)
     quality       how good a synthesized field is
     combine       F = upsample(L) + omega H' (§3.5), and its projection (§3.6)
     density       the smoke that F carries, naive and windowed (supplement A, pseudocode 3 and 4)

@@ -137,12 +137,16 @@ class Synthesis:
 
     def frame(self, L: np.ndarray, state: State | None) -> State:
         """The state after the frame with coarse motion L (Y, X, 2) cells per frame; None before the first."""
+        motions, frames = self.motions(L)
+        return State(self._first(frames) if state is None else self._next(motions, frames, state), frames)
+
+    def motions(self, L: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """L (Y, X, 2) and its local frames on each level, coarsest first, continued over the margin."""
         motions = [motion / np.float32(2 ** (len(self.levels) - 1 - i))
                    for i, motion in enumerate(pyramid.pyramid(L, len(self.levels), toroidal=False))]
         # before the margins: these are the frames that turn H into H' afterwards
         frames = [_margin(local_frame(motion, self.along)) for motion in motions]
-        motions = [_margin(motion) for motion in motions]
-        return State(self._first(frames) if state is None else self._next(motions, frames, state), frames)
+        return [_margin(motion) for motion in motions], frames
 
     def _first(self, frames: list[np.ndarray]) -> list[np.ndarray]:
         """H of each level of the first frame: the coarsest from a mosaic, each other from the one before."""

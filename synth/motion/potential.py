@@ -19,8 +19,9 @@ from synth.wake import ramp
 
 # the potential is zero where the exemplar is slower than this share of its rms
 RESTING = 0.1
-# modes that central differences see this little, as a share of what they see best, are left out
-UNSEEN = 1e-2
+# modes that nearly alternate from cell to cell, whose slopes central differences see at less than this share, are left
+# out: their potential would be all noise
+UNSEEN = 0.1
 # ψ is ramped down to a wall within these cells, half the width of the narrowest neighbourhood, and to zero one cell
 # before it, so that the differences at the wall see nothing else
 WALL = 4.0
@@ -36,11 +37,12 @@ def potential(exemplar: np.ndarray) -> tuple[np.ndarray, float]:
     values = exemplar.astype(np.float64)
     rows, columns = values.shape[:2]
     spectrum = np.fft.fft2(values, axes=(0, 1))
-    slope_y = 1j * np.sin(2 * np.pi * np.fft.fftfreq(rows))[:, None]
-    slope_x = 1j * np.sin(2 * np.pi * np.fft.fftfreq(columns))[None, :]
-    seen = np.abs(slope_x) ** 2 + np.abs(slope_y) ** 2
-    psi = (np.conj(slope_y) * spectrum[..., 0] - np.conj(slope_x) * spectrum[..., 1]) / np.where(seen > UNSEEN, seen, 1)
-    psi = np.fft.ifft2(np.where(seen > UNSEEN, psi, 0)).real
+    angle_y, angle_x = 2 * np.pi * np.fft.fftfreq(rows)[:, None], 2 * np.pi * np.fft.fftfreq(columns)[None, :]
+    slope_y, slope_x = 1j * np.sin(angle_y), 1j * np.sin(angle_x)
+    squared = np.abs(slope_x) ** 2 + np.abs(slope_y) ** 2
+    seen = squared > UNSEEN**2 * (angle_x**2 + angle_y**2)
+    psi = (np.conj(slope_y) * spectrum[..., 0] - np.conj(slope_x) * spectrum[..., 1]) / np.where(seen, squared, 1)
+    psi = np.fft.ifft2(np.where(seen, psi, 0)).real
     rms = np.sqrt(np.mean(values**2))
     around = np.stack([np.roll(psi, -1, 0) - np.roll(psi, 1, 0), np.roll(psi, 1, 1) - np.roll(psi, -1, 1)], -1) / 2
     lost = float(np.sqrt(np.mean((values - around) ** 2)) / rms)
