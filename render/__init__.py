@@ -9,6 +9,7 @@ In the order data passes through them:
     seaweed   blades under water, by path tracing
     studio    what a volume is photographed in: camera, lights, backdrop, bowl
     backend   the one home of Mitsuba and Dr.Jit
+    march     light carried through a volume without noise: the picture of an animation
     denoise   path-traced smoke without its noise
     film      linear light to display values to eight bits
     layout    panels, labels, insets and legends as one figure

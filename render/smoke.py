@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy import ndimage
 
-from render import backend, denoise, lic, sheet, studio
+from render import backend, denoise, lic, march, sheet, studio
 
 # The lit sheet. Lengths are shares of the picture's height, so a scene looks the same at any width.
 THICKNESS = 0.075  # about the size of one motif
@@ -48,7 +48,8 @@ SMOKE_ALBEDO = (0.90, 0.905, 0.915)
 SMOKE_FORWARD = 0.2  # mean cosine of the scattering angle
 MAX_DEPTH = 32  # bounces; what is left after them is 3 % of the light
 MOST_DENSITY = 1e3  # delta tracking steps by the largest extinction: one cell of 1e8 takes for ever
-STAGE_SPP = 128  # for the empty stage: a guide must not be noisy
+STAGE_SPP = 128  # for each light on the empty stage: it must not be noisy
+BORDER_PATHS = 256  # for the light that comes to the smoke from each direction
 FARTHEST = 1e3  # stands for a ray that meets nothing
 MOST_SAMPLES = 2**30  # in one pass; Mitsuba's memory explodes above 2^32
 
@@ -154,7 +155,8 @@ class VolumeSettings:
     """How `volume` looks at a density. Lengths in world units.
 
     extinction: per world unit at density 1; spp: paths per pixel; bowl: (radius, height) of the bowl that the
-    plume rises from, None for none; denoised: fit the paths to guides without noise (`render.denoise`).
+    plume rises from, None for none; method: "path", by Mitsuba's volpath, or "march" (`render.march`), which has
+    no noise; denoised: fit the paths to guides without noise (`render.denoise`).
     """
 
     width: int = 512
@@ -164,6 +166,7 @@ class VolumeSettings:
     extinction: float = 110.0
     bowl: tuple[float, float] | None = None
     camera: studio.Camera = studio.CAMERA
+    method: str = "path"
     denoised: bool = True
 
 
@@ -179,7 +182,7 @@ def active_box(density: np.ndarray) -> tuple[slice, slice, slice]:
 
 def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, float],
            settings: VolumeSettings = VolumeSettings()) -> np.ndarray:
-    """A path-traced picture (height, width, 3) of a density (Z, Y, X) in the studio, linear light.
+    """A picture (height, width, 3) of a density (Z, Y, X) in the studio, linear light.
 
     voxel_size, origin: of the grid in world units, origin at the centre of cell (0, 0, 0), order x, y, z.
     Raises ValueError for what Mitsuba would answer with a black picture, a hang or exhausted memory.
@@ -187,6 +190,9 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
     density = checked_density(density, 3)
     if density.max() > MOST_DENSITY:
         raise ValueError(f"a density of {density.max():g} is too much to render (at most {MOST_DENSITY:g})")
+    if settings.method == "march":
+        stage = empty_stage(settings)
+        return marched(density, voxel_size, origin, settings, stage).picture(stage)
     mi = backend.mitsuba("scalar_rgb")
     scene = _studio(mi, settings.bowl)
     if density.any():
@@ -194,29 +200,62 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
     light = _photographed(mi, scene, settings)
     if not settings.denoised:
         return light
+    stage = empty_stage(settings)
+    return denoise.denoised(light, settings.spp, marched(density, voxel_size, origin, settings, stage), stage)
+
+
+def marched(density: np.ndarray, voxel_size: float, origin: tuple[float, float, float], settings: VolumeSettings,
+            stage: march.Stage) -> march.Seen:
+    """What the march sees of a density (Z, Y, X), as of `volume`."""
     box = active_box(density) if density.any() else (slice(0, 2),) * 3
-    sigma = density[box] * np.float32(settings.extinction * voxel_size)
     corner = np.array(origin) + voxel_size * np.array([side.start for side in box[::-1]])
-    stage = _empty_stage(dataclasses.replace(settings, spp=STAGE_SPP, seed=1))
-    return denoise.denoised(light, settings.spp, denoise.Grid(sigma, voxel_size, corner), settings.camera, stage)
+    grid = march.Grid(density[box] * np.float32(settings.extinction * voxel_size), voxel_size, corner)
+    lamps = [march.Lamp(np.array(box.position) - 0.5 * sum(box.edges), box.edges, box.radiance)
+             for box in studio.LAMPS.values()]
+    return march.seen(grid, lamps, march.Medium(SMOKE_ALBEDO, SMOKE_FORWARD), stage)
+
+
+def empty_stage(settings: VolumeSettings) -> march.Stage:
+    """The studio without smoke as `settings` see it, each light for itself; kept for all frames of an animation."""
+    return _empty_stage(dataclasses.replace(settings, spp=STAGE_SPP, seed=1, extinction=1.0, method="path",
+                                            denoised=False))
 
 
 @functools.lru_cache(maxsize=2)
-def _empty_stage(settings: VolumeSettings) -> denoise.Stage:
-    """The studio without smoke, kept for all frames of an animation."""
+def _empty_stage(settings: VolumeSettings) -> march.Stage:
     mi = backend.mitsuba("scalar_rgb")
-    scene = _studio(mi, settings.bowl)
-    light = _photographed(mi, scene, settings)
-    loaded = mi.load_dict({"type": "scene"} | scene)
-    # four rays per pixel: the guides' edges are as smooth as the picture's
-    position, rays = denoise.view_rays(settings.camera, 2 * settings.width, 2 * settings.height)
+    loaded = mi.load_dict({"type": "scene"} | _studio(mi, settings.bowl))
+    # four rays per pixel: edges are as smooth as the picture's
+    rays = settings.camera.rays(2 * settings.width, 2 * settings.height)
     unit = rays.reshape(-1, 3) / np.linalg.norm(rays.reshape(-1, 3), axis=1, keepdims=True)
-    start = mi.Point3f(list(position))
+    start = mi.Point3f(list(settings.camera.position))
     met = [loaded.ray_intersect(mi.Ray3f(start, mi.Vector3f(list(ray)))) for ray in unit]
-    distance = np.minimum([m.t for m in met], FARTHEST).reshape(rays.shape[:2])
+    distance = lic.averaged(np.minimum([m.t for m in met], FARTHEST).reshape(rays.shape[:2]), 2)
     bowl = [list(m.sh_frame.n) if m.is_valid() and m.shape.id() == "bowl" else [0.0] * 3 for m in met]
-    return denoise.quiet_stage(light, lic.averaged(distance, 2),
-                               lic.averaged(np.array(bowl).reshape(rays.shape), 2))
+    normals = lic.averaged(np.array(bowl).reshape(rays.shape), 2)
+    layers = [denoise.quiet_stage(_photographed(mi, _studio(mi, settings.bowl, [name]), settings), distance, normals)
+              for name in (*studio.LAMPS, "sky")]
+    return march.Stage(np.array(settings.camera.position), settings.camera.rays(settings.width, settings.height),
+                       distance, np.array(layers), _border(mi))
+
+
+def _border(mi: Any) -> np.ndarray:
+    """The light (6, 4, 3) that comes to the middle of the stage from each of `march.directions`, but for the lamps'
+    own."""
+    light = np.zeros((6, 4, 3), np.float64)
+    random = np.random.Generator(np.random.Philox(key=1))
+    middle = mi.Point3f(0.0, 0.5, 0.0)
+    for lights, hidden in ((list(studio.LAMPS), True), (["sky"], False)):
+        scene = mi.load_dict({"type": "scene"} | _studio(mi, None, lights))
+        integrator = mi.load_dict({"type": "path", "max_depth": MAX_DEPTH, "hide_emitters": hidden})
+        sampler = mi.load_dict({"type": "independent"})
+        sampler.seed(1)
+        for place in np.ndindex(6, 4):
+            for spread in 0.3 * random.standard_normal((BORDER_PATHS, 3)):
+                towards = march.directions()[place] + spread
+                ray = mi.RayDifferential3f(middle, mi.Vector3f(list(towards / np.linalg.norm(towards))))
+                light[place] += np.array(integrator.sample(scene, sampler, ray)[0]).reshape(3) / BORDER_PATHS
+    return light
 
 
 def _photographed(mi: Any, scene: dict[str, Any], settings: VolumeSettings) -> np.ndarray:
@@ -282,14 +321,16 @@ def _mesh(mi: Any, name: str, mesh: studio.Mesh, colour: studio.Point) -> Any:
     return shape
 
 
-def _studio(mi: Any, bowl: tuple[float, float] | None) -> dict[str, Any]:
-    """Backdrop and bowl, key, rim and sky; `sampling_weight` sends most shadow rays to key and rim."""
-    scene: dict[str, Any] = {
-        "backdrop": _mesh(mi, "backdrop", studio.backdrop(), studio.BACKDROP_COLOUR),
-        "sky": {"type": "constant", "radiance": {"type": "rgb", "value": list(studio.SKY)},
-                "sampling_weight": studio.SKY_SHARE},
-    }
-    for name, box in (("key", studio.KEY), ("rim", studio.RIM)):
+def _studio(mi: Any, bowl: tuple[float, float] | None,
+            lights: Sequence[str] = (*studio.LAMPS, "sky")) -> dict[str, Any]:
+    """Backdrop and bowl, and lights; `sampling_weight` sends most shadow rays to key and rim."""
+    scene: dict[str, Any] = {"backdrop": _mesh(mi, "backdrop", studio.backdrop(), studio.BACKDROP_COLOUR)}
+    if "sky" in lights:
+        scene["sky"] = {"type": "constant", "radiance": {"type": "rgb", "value": list(studio.SKY)},
+                        "sampling_weight": studio.SKY_SHARE}
+    for name, box in studio.LAMPS.items():
+        if name not in lights:
+            continue
         scene[name] = {
             "type": "rectangle",
             "to_world": mi.ScalarTransform4f().look_at(

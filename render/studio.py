@@ -29,6 +29,18 @@ class Camera:
     target: Point = (0.0, 0.475, 0.0)
     fov: float = 11.4
 
+    def rays(self, width: int, height: int) -> np.ndarray:
+        """Directions (height, width, 3), not unit vectors, through the middles of the pixels, top row first."""
+        ahead = np.array(self.target) - np.array(self.position)
+        ahead /= np.linalg.norm(ahead)
+        right = np.cross(ahead, [0.0, 1.0, 0.0])
+        right /= np.linalg.norm(right)
+        up = np.cross(right, ahead)
+        half = np.tan(np.radians(self.fov) / 2)
+        y = half * (1.0 - 2.0 * (np.arange(height) + 0.5) / height)
+        x = half * (2.0 * (np.arange(width) + 0.5) / width - 1.0) * (width / height)
+        return np.asarray(ahead + x[None, :, None] * right + y[:, None, None] * up)
+
 
 @dataclass(frozen=True)
 class Softbox:
@@ -43,10 +55,20 @@ class Softbox:
     radiance: Point
     share: float
 
+    @property
+    def edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Its lower and its left edge (3,), as vectors: level, and upright."""
+        facing = np.array(self.target) - np.array(self.position)
+        level = np.cross([0.0, 1.0, 0.0], facing)
+        level *= self.size[0] / np.linalg.norm(level)
+        upright = np.cross(facing, level)
+        return level, upright * (self.size[1] / np.linalg.norm(upright))
+
 
 CAMERA = Camera()
 KEY = Softbox((-3.3, 2.4, 0.9), (0.0, 0.4, 0.0), (1.5, 1.5), (44.0, 39.0, 33.0), 1.0)  # warm, raking
 RIM = Softbox((2.5, 2.0, -2.2), (0.0, 0.5, 0.0), (1.0, 1.8), (14.0, 18.0, 24.0), 1.0)  # cool, from behind
+LAMPS = {"key": KEY, "rim": RIM}
 SKY: Point = (0.055, 0.066, 0.085)  # radiance of the dim light from everywhere
 SKY_SHARE = 0.15
 BACKDROP_COLOUR: Point = (0.085, 0.092, 0.105)

@@ -1,70 +1,27 @@
-"""render.denoise: marches and fits whose result is known, and the noise that a real render loses."""
+"""render.denoise: fits whose result is known, and the noise that a real render loses."""
 
 import numpy as np
 import pytest
 
-from render import denoise, sheet, smoke, studio
-from render.denoise import Grid
+from render import denoise, march, smoke
 
 
 def noise(*shape: int, seed: int = 1) -> np.ndarray:
     return np.random.Generator(np.random.Philox(key=seed)).standard_normal(shape)
 
 
-@pytest.mark.parametrize("axes", [(0, 1, 2), (1, 0, 2), (2, 1, 0), (1, 2, 0)])
-def test_depth_grows_linearly_towards_each_side(axes: tuple[int, int, int]) -> None:
-    """In uniform smoke of 0.1 per cell: a tenth per cell, whichever axis the light is on."""
-    sigma = np.full((6, 6, 6), 0.1, np.float32)
-    for sign in (1.0, -1.0):
-        towards = [0.0, 0.0, 0.0]
-        towards[2 - axes[0]] = sign
-        depth = np.moveaxis(denoise.depth_towards(sigma, (towards[0], towards[1], towards[2])), axes[0], 0)
-        expected = 0.1 * np.arange(6)[::-1] if sign > 0 else 0.1 * np.arange(6)
-        assert depth[:, 3, 3] == pytest.approx(expected, abs=1e-6)
-
-
-def test_depth_of_a_sheet_is_that_of_the_flat_smoke() -> None:
-    """Light in the plane of a flat field: the same numbers as `sheet.depth_towards`."""
-    flat = np.abs(noise(12, 14)).astype(np.float32)
-    depth = denoise.depth_towards(np.repeat(flat[None], 3, axis=0), (0.6, 0.8, 0.0))
-    assert depth[1] == pytest.approx(sheet.depth_towards(flat, (0.6, 0.8)), rel=1e-4, abs=1e-4)
-
-
-def slab(cells: int = 8) -> Grid:
-    """Extinction 2 per world unit, cells of 0.25, cell (0, 0, 0) at (-1, -1, -1)."""
-    return Grid(np.full((cells, cells, cells), 0.5, np.float32), 0.25, np.array([-1.0, -1.0, -1.0]))
-
-
-def test_march_is_beer_lambert_straight_and_aslant() -> None:
-    """Rays through the middle: exp(-2 * 8 cells * 0.25), aslant the longer way."""
-    rays = np.array([[0.0, 0.0, -1.0], [0.1, 0.0, -1.0], [0.0, 0.0, -3.0]])
-    start = np.array([[-0.1, -0.1, 5.0], [-0.6, -0.1, 5.0], [-0.1, -0.1, 5.0]])
-    passed = denoise.march(slab(), start, rays, np.full(3, 100.0))[:, 0]
-    assert passed == pytest.approx(np.exp([-4.0, -4.0 * np.hypot(1.0, 0.1), -4.0]), rel=1e-5)
-
-
-def test_march_ends_at_surfaces_begins_at_its_start_and_misses_what_it_misses() -> None:
-    rays = np.array([[0.0, 0.0, -1.0]] * 3)
-    start = np.array([[0.0, 0.0, 5.0], [0.0, 0.0, 0.1], [3.0, 0.0, 5.0]])
-    passed = denoise.march(slab(), start, rays, np.array([5.1, 100.0, 100.0]))[:, 0]
-    assert passed == pytest.approx(np.exp([-4 * 0.5, -5 * 0.5, 0.0]), rel=1e-5)
-
-
-def test_march_sees_each_light_by_its_share_in_front() -> None:
-    """A light of 1 everywhere is seen by what absorbs, 1 - passed; one far off, dimmed."""
-    far = np.zeros((8, 8, 8), np.float32)
-    far[:4] = 1.0  # small z: far from an eye at z = 5
-    seen = denoise.march(slab(), np.array([[0.0, 0.0, 5.0]]), np.array([[0.0, 0.0, -1.0]]), np.array([100.0]),
-                         (np.ones_like(far), far))[0]
-    assert seen == pytest.approx([np.exp(-4.0), 1.0 - np.exp(-4.0), np.exp(-2.0) - np.exp(-4.0)], rel=1e-4)
-
-
-def test_rays_of_the_view_go_where_the_camera_looks() -> None:
-    camera = studio.Camera(position=(0.0, 0.0, 4.0), target=(0.0, 0.0, 0.0), fov=90.0)
-    position, rays = denoise.view_rays(camera, 4, 2)
-    assert position.tolist() == [0.0, 0.0, 4.0]
-    assert rays[0, 0] == pytest.approx([-1.5, 0.5, -1.0])  # top row first, left first
-    assert rays[1, 3] == pytest.approx([1.5, -0.5, -1.0])
+def test_guides_know_what_is_seen_and_what_lies_in_shadow() -> None:
+    """No smoke: the stage itself in every guide of it; half seen and half in shadow: half and a quarter of it."""
+    layers = np.abs(noise(3, 2, 4, 3))
+    stage = march.Stage(np.zeros(3), np.ones((2, 4, 3)), np.ones((2, 4)), layers, np.zeros((6, 4, 3)))
+    clear = denoise.guides(march.Seen(np.zeros((2, 4, 3)), np.ones((2, 4)), np.ones((2, 2, 4))), stage)
+    assert clear.shape == (2, 4, 9) and clear.dtype == np.float32
+    assert clear[..., 4:7] == pytest.approx(layers.sum(axis=0), rel=1e-6)
+    assert clear[..., 7] == pytest.approx(layers.sum(axis=0).mean(axis=-1), rel=1e-6)
+    half = denoise.guides(march.Seen(np.ones((2, 4, 3)), np.full((2, 4), 0.5), np.full((2, 2, 4), 0.5)), stage)
+    assert half[..., 0] == pytest.approx(0.5) and half[..., 1:4] == pytest.approx(1.0)
+    assert half[..., 4:7] == pytest.approx(0.5 * clear[..., 4:7])
+    assert half[..., 7:] == pytest.approx(0.25 * clear[..., 7:])
 
 
 def test_what_is_linear_in_the_guides_stays_as_it_is() -> None:

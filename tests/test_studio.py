@@ -1,6 +1,7 @@
 """render.studio: meshes that are closed where they should be and stand where they should."""
 
 import numpy as np
+import pytest
 
 from render import studio
 
@@ -45,3 +46,20 @@ def test_the_backdrop_is_smooth_and_its_floor_is_at_zero() -> None:
     angle = np.degrees(np.unwrap(np.arctan2(steps[:, 0], -steps[:, 1])))
     assert np.abs(np.diff(angle)).max() < 3.0
     assert backdrop.vertices[:, 1].min() == 0.0
+
+
+def test_rays_of_the_view_go_where_the_camera_looks() -> None:
+    camera = studio.Camera(position=(0.0, 0.0, 4.0), target=(0.0, 0.0, 0.0), fov=90.0)
+    rays = camera.rays(4, 2)
+    assert rays[0, 0] == pytest.approx([-1.5, 0.5, -1.0])  # top row first, left first
+    assert rays[1, 3] == pytest.approx([1.5, -0.5, -1.0])
+
+
+def test_the_edges_of_a_softbox_lie_in_its_face() -> None:
+    for box in studio.LAMPS.values():
+        level, upright = box.edges
+        facing = np.array(box.target) - np.array(box.position)
+        assert [np.linalg.norm(edge) for edge in box.edges] == pytest.approx(box.size)
+        assert level[1] == 0.0 and upright[1] > 0.0
+        assert level @ upright == pytest.approx(0.0, abs=1e-9)
+        assert level @ facing == pytest.approx(0.0, abs=1e-9) and upright @ facing == pytest.approx(0.0, abs=1e-9)
