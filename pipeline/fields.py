@@ -170,13 +170,16 @@ def make_detail(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
 
 
 def _flat_synthesis(scene: Scene, stock: Stock) -> tuple[Any, type]:
-    from synth.motion import detail
+    from synth.motion import detail, lagrangian, potential
 
     wanted = scene.detail
     levels = detail.enough_levels(scene.exemplar.size) if wanted.levels == "auto" else wanted.levels
     settings = detail.Settings(levels, wanted.neighborhoods, wanted.iterations, wanted.search, wanted.k, wanted.along)
-    return detail.Synthesis(stock.read("exemplar").values, (scene.shape[0], scene.shape[1]), settings,
-                            scene.seed), detail.State
+    exemplar, shape = stock.read("exemplar").values, (scene.shape[0], scene.shape[1])
+    if wanted.samples == "lagrangian":
+        return lagrangian.Synthesis(exemplar, shape, settings, scene.seed), lagrangian.State
+    way = potential.Synthesis if wanted.synthesize == "potential" else detail.Synthesis
+    return way(exemplar, shape, settings, scene.seed), detail.State
 
 
 def _solid_synthesis(scene: Scene, stock: Stock) -> tuple[Any, type]:
@@ -290,9 +293,18 @@ def products(scene: Scene) -> tuple[Product, ...]:
         name="H", stage="synth", folder="fields", suffix=suffix,
         reads=("detail", "seed", "fps", *(() if flat else ("views",))),
         inputs=(*((name, "once") for name in known), ("L", "until"), *out_of_smoke),
-        methods=("synth.motion.detail" if flat else "synth.motion.solid", "synth.motion.coarse", "synth.field"),
+        methods=(_method(scene), "synth.motion.coarse", "synth.field"),
         make=make_detail, write=write_detail, read=read_field))
     return tuple(made)
+
+
+def _method(scene: Scene) -> str:
+    """The module that synthesizes H."""
+    if scene.dimension == 3:
+        return "synth.motion.solid"
+    if scene.detail.samples == "lagrangian":
+        return "synth.motion.lagrangian"
+    return "synth.motion.potential" if scene.detail.synthesize == "potential" else "synth.motion.detail"
 
 
 def _exemplar_suffix(key: str) -> Callable[[Scene], str]:

@@ -254,8 +254,17 @@ def _flat_and_deep(scene: Scene) -> Faults:
     else:
         if density.depth is not None:
             yield "density.depth", f"gives a plane a body; detail.size is {size}, which has one"
+        for name, default in (("synthesize", "motion"), ("samples", "grid")):
+            chosen = getattr(detail, name)
+            if chosen != default:
+                yield f"detail.{name}", f'"{chosen}" is for a field in the plane; detail.size is {size}'
         if render.kind in FLAT:
             yield "render.kind", f'"{render.kind}" draws smoke in a plane; detail.size is {size}'
+    if detail.samples == "lagrangian":
+        if detail.search != "exact":
+            yield "detail.search", "samples that move have no fixed neighbours for k-coherence to ask: say exact"
+        if detail.synthesize != "motion":
+            yield "detail.synthesize", "the potential is synthesized on the grid only"
     if (detail.facing == "directions") != bool(detail.directions):
         yield "detail.directions", ("is missing, for facing = \"directions\"" if not detail.directions else
                                     f"is not used with facing = \"{detail.facing}\"")

@@ -196,6 +196,11 @@ class Detail(Table):
     search: Literal["exact", "k-coherence"] = key("exact, or k-coherence (§3.7)", _search)
     k: int = key("candidates of k-coherence", 4, ge=1, le=32)
     along: Literal["x", "y"] = key("the exemplar's axis that follows L (§3.3); \"y\": upright motifs rise upright", "x")
+    synthesize: Literal["motion", "potential"] = key(
+        "in the plane: H itself, or its potential, whose curl has no divergence (§3.6, Discussion); the exemplar's "
+        "mean motion, sources and sinks have no potential and are lost", "motion")
+    samples: Literal["grid", "lagrangian"] = key(
+        "in the plane: H is synthesized on the grid, or at samples that move with L and keep their detail (§5)", "grid")
     facing: Literal["camera", "density", "directions"] = key(
         "in 3-D, what the local z axis faces (§3.3): the front, out of the smoke that L carries, or what "
         "[[detail.directions]] say", "camera")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import functools
 import hashlib
+import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -24,8 +25,11 @@ def sources(method: str) -> tuple[Path, ...]:
         if file.is_file() and file not in found:
             found.append(file)
             waiting += _imported(file)
-    kernels = [file.with_suffix(suffix) for file in found for suffix in (".cl", ".h")]
-    return (*found, *(file for file in kernels if file.is_file()))
+    kernels = [file.with_suffix(".cl") for file in found if file.with_suffix(".cl").is_file()]
+    for kernel in kernels:  # grows by what it includes, as synth.opencl.with_includes finds it
+        named = re.findall(r'^#include "([^"]+)"$', kernel.read_text(), flags=re.MULTILINE)
+        kernels += [file for name in named if (file := ROOT / "synth" / name).is_file() and file not in kernels]
+    return (*found, *kernels)
 
 
 def _file(module: str) -> Path:

@@ -10,6 +10,7 @@ from pipeline import fields
 from pipeline.files import images, pictures, video, volumes
 from pipeline.schema import PROJECT_SCENES, Scene
 from synth.field import Field
+from synth.motion import lagrangian
 from synth.motion.coarse import upsample
 from synth.motion.density import naive
 from synth.motion.detail import State
@@ -129,18 +130,38 @@ def test_a_coarse_motion_from_a_file_is_placed_on_the_domain(tmp_path: Path) -> 
     assert found[1] == found[4] == Field.centred(values, 2)
 
 
-def test_detail_goes_on_from_its_state_with_the_same_bits_and_without_it_from_the_start(tmp_path: Path) -> None:
-    made = scene()
+WAYS: dict[str, tuple[dict[str, str], type]] = {
+    "motion": ({}, State), "potential": ({"synthesize": "potential"}, State),
+    "lagrangian": ({"samples": "lagrangian"}, lagrangian.State)}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_detail_goes_on_from_its_state_with_the_same_bits_and_without_it_from_the_start(
+        tmp_path: Path, way: str) -> None:
+    keys, state_type = WAYS[way]
+    made = scene(detail={"size": [16, 16], "iterations": 1, "neighborhoods": [5], **keys})
     motion = dict(fields.make_coarse(made, Memory(tmp_path, {}), [1, 2, 3, 4]))
     stock = Memory(tmp_path, {("exemplar", 0): Field.centred(exemplar("circle", 8), 2),
                               **{("L", frame): L for frame, L in motion.items()}})
     every = dict(fields.make_detail(made, stock, [1, 2, 3, 4]))
     assert (tmp_path / fields.STATE).is_file()
-    assert fields._kept(stock, 4, State)[0] == 3
+    assert fields._kept(stock, 4, state_type)[0] == 3
     assert dict(fields.make_detail(made, stock, [4])) == {4: every[4]}
     (tmp_path / fields.STATE).write_bytes((tmp_path / fields.STATE).read_bytes()[:-50])
-    assert fields._kept(stock, 4, State) == (0, None)
+    assert fields._kept(stock, 4, state_type) == (0, None)
     assert dict(fields.make_detail(made, stock, [4])) == {4: every[4]}
+
+
+def test_each_way_of_synthesis_is_another(tmp_path: Path) -> None:
+    found = {}
+    for way, (keys, _) in WAYS.items():
+        made = scene(detail={"size": [16, 16], "iterations": 1, "neighborhoods": [5], **keys})
+        stock = Memory(tmp_path, {("exemplar", 0): Field.centred(exemplar("circle", 8), 2)})
+        stock.files["L", 1] = dict(fields.make_coarse(made, stock, [1]))[1]
+        found[way] = dict(fields.make_detail(made, stock, [1]))[1]
+        assert found[way].shape == (16, 16)
+        assert f"synth.motion.{'detail' if way == 'motion' else way}" in fields.products(made)[-1].methods
+    assert found["motion"] != found["potential"] != found["lagrangian"] != found["motion"]
 
 
 SPACE: dict[str, Any] = {
