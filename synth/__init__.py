@@ -5,13 +5,14 @@ In the order data passes through them:
     field       a field that knows its grid and its units
     opencl      the one home of OpenCL: device, build, launch
     advect      semi-Lagrangian advection [Stam 1999]
-    projection  exact Helmholtz-Hodge projection
+    projection  Helmholtz-Hodge projection, exact in a box, and past obstacles
     noise       curl noise [Bridson et al. 2007]
     obstacle    solids, as a signed distance field
     wake        a river past a round stone [Bridson et al. 2007]
     smoke       a simulated plume [Stam 1999; Fedkiw et al. 2001]
     pyramid     image pyramids of fields
     blades      a bed of seaweed that a motion field bends
+    particles   carried by a motion, past obstacles
     motion/     motion field texture synthesis (ma09)
 
 Arrays are C order float32: (Y, X[, 2]) or (Z, Y, X[, 3]), components x, y, z, row 0 the lowest, cell
