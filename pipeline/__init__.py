@@ -8,6 +8,7 @@ In the order data passes through them:
     stages      which products are not whole, and making them: synth, bake, render, figure
     product     what a product is: a series of files, and what its content depends on
     sources     the code that a product depends on
+    obstacles   synth: the solids in the flow
     fields      synth: exemplar, L and H
     geometry    bake: F and the density
     panels      render: the smoke, and pictures of the fields

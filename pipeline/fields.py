@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline import obstacles
 from pipeline.errors import BadInput
 from pipeline.files import atomic, images, pictures, volumes
 from pipeline.product import Frames, Product, Stock, value_at
@@ -124,13 +125,27 @@ def make_coarse(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
             raise BadInput(wanted.file, "coarse.file", f"{'×'.join(map(str, size))} has not the shape of detail.size, "
                                                        f"{'×'.join(map(str, detail))}")
         steady = Field.centred(steady.values, scene.dimension)
+        if scene.obstacles:
+            steady = Field.centred(_past_obstacles(scene, stock, steady.values), scene.dimension)
         yield from ((frame, steady) for frame in frames)
         return
     settings = wanted.model_dump(exclude={"kind", "size"})
+    if wanted.kind == "wake" and scene.stone:
+        settings |= {"centre": scene.stone.centre, "radius": scene.stone.radius[0]}
     motion = coarse(wanted.kind, wanted.size[::-1], frames[-1], scene.seed, **settings)
     for frame, values in enumerate(motion, start=1):
         if frame in frames:
+            if scene.obstacles and wanted.kind != "wake":  # which passes its stone by itself
+                values = _past_obstacles(scene, stock, values)
             yield frame, Field.centred(values, scene.dimension).per_second(scene.fps)
+
+
+def _past_obstacles(scene: Scene, stock: Stock, L: np.ndarray) -> np.ndarray:
+    """L on the cells of H, where the walls are as sharp as H will know them, with no flow through them."""
+    from synth.motion.coarse import upsample
+    from synth.projection import project
+
+    return project(upsample(L, scene.shape), obstacles.border(scene), obstacles.distance(scene, stock))
 
 
 def make_smoke(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
@@ -179,7 +194,8 @@ def _flat_synthesis(scene: Scene, stock: Stock) -> tuple[Any, type]:
     if wanted.samples == "lagrangian":
         return lagrangian.Synthesis(exemplar, shape, settings, scene.seed), lagrangian.State
     way = potential.Synthesis if wanted.synthesize == "potential" else detail.Synthesis
-    return way(exemplar, shape, settings, scene.seed), detail.State
+    return way(exemplar, shape, settings, scene.seed,
+               obstacles.distance(scene, stock) if wanted.boundary else None), detail.State
 
 
 def _solid_synthesis(scene: Scene, stock: Stock) -> tuple[Any, type]:
@@ -274,6 +290,7 @@ def facing(scene: Scene, which: Frames) -> tuple[tuple[str, Frames], ...]:
 def products(scene: Scene) -> tuple[Product, ...]:
     """The exemplars, L, the smoke O where the local frame faces out of it, and H."""
     flat, known, out_of_smoke = scene.dimension == 2, scene.exemplars, facing(scene, "until")
+    solid = obstacles.inputs(scene)
     files = ("synth.motion.exemplar", "synth.field")
     # of one file a flat scene takes another part than one in space
     made = [Product(
@@ -282,8 +299,10 @@ def products(scene: Scene) -> tuple[Product, ...]:
         make=_exemplar(key), write=write_field, read=read_field) for name, key in known.items()]
     made.append(Product(
         name="L", stage="synth", folder="fields", suffix=suffix,
-        reads=("coarse", "seed", "fps", *(("dimension",) if scene.coarse.kind == "file" else ())), inputs=(),
-        methods=("synth.motion.coarse", "synth.field"), make=make_coarse, write=write_velocity, read=read_field))
+        reads=("coarse", "seed", "fps", *(("dimension",) if scene.coarse.kind == "file" else ()),
+               *(("stone", "detail.size") if solid else ())), inputs=solid,
+        methods=("synth.motion.coarse", "synth.projection", "synth.field"), make=make_coarse, write=write_velocity,
+        read=read_field))
     if out_of_smoke:
         made.append(Product(
             name="O", stage="synth", folder="fields", suffix=suffix,
@@ -292,7 +311,8 @@ def products(scene: Scene) -> tuple[Product, ...]:
     made.append(Product(
         name="H", stage="synth", folder="fields", suffix=suffix,
         reads=("detail", "seed", "fps", *(() if flat else ("views",))),
-        inputs=(*((name, "once") for name in known), ("L", "until"), *out_of_smoke),
+        inputs=(*((name, "once") for name in known), ("L", "until"), *out_of_smoke,
+                *(solid if scene.detail.boundary else ())),
         methods=(_method(scene), "synth.motion.coarse", "synth.field"),
         make=make_detail, write=write_detail, read=read_field))
     return tuple(made)

@@ -1,5 +1,5 @@
-"""What bake makes, in out/X/geometry: the final motion F, and what it moves, the smoke density or the blades of
-seaweed; in world units.
+"""What bake makes, in out/X/geometry: the final motion F, and what it moves, the smoke density, particles or the
+blades of seaweed; in world units.
 
 These are moved by F as it is computed from L and H, not by the files of F: so any frame can be baked alone, by any
 machine of a farm.
@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline import obstacles
 from pipeline.fields import (
     LOCAL_FRAME,
     coarse_cells,
@@ -25,9 +26,9 @@ from pipeline.fields import (
     write_velocity,
 )
 from pipeline.files import meshes
-from pipeline.product import Product, Stock
+from pipeline.product import Frames, Product, Stock
 from pipeline.schema import Scene
-from synth.field import Field
+from synth.field import Field, domain_origin
 
 
 def transformed(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
@@ -48,7 +49,8 @@ def final_motion(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
 
     weight = None if scene.combine.weight == "uniform" else scene.combine.weight
     return combine(stock.read("L", frame).per_frame(scene.fps).values, transformed(scene, stock, frame),
-                   scene.combine.omega, weight, "wall" if scene.combine.project else None)
+                   scene.combine.omega, weight, obstacles.border(scene) if scene.combine.project else None,
+                   obstacles.distance(scene, stock) if scene.combine.project else None)
 
 
 def make_final(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
@@ -127,6 +129,7 @@ def _ply(scene: Scene) -> str:
 
 
 Mesh = dict[str, np.ndarray]
+Points = dict[str, np.ndarray]
 
 
 def make_blades(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Mesh]]:
@@ -150,6 +153,59 @@ def _motion(scene: Scene, stock: Stock, frame: int) -> Field:
     return Field.centred(final_motion(scene, stock, frame), 3).per_second(scene.fps)
 
 
+def make_particles(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Points]]:
+    """The particles, as `meshes.write_points` takes them; from the last frame that is whole, or from the first."""
+    from synth import particles
+
+    count, life = scene.particles.count, scene.particles.life
+    distance = obstacles.distance(scene, stock)
+    kept = stock.own(frames[0] - 1) if frames[0] > 1 else None
+    after = final_motion(scene, stock, frames[0] - 1 if kept else 1)
+    points = kept or _placed_points(scene, particles.start(after, count, life, scene.seed, distance))
+    first = frames[0] - 1 if kept else 1
+    if first in frames:
+        yield first, points
+    for frame in range(first + 1, frames[-1] + 1):
+        before, after = after, final_motion(scene, stock, frame)
+        # through the file's numbers, so that going on from a file gives the same bits
+        points = _placed_points(scene, particles.moved(_free_points(scene, points), before, after, life, frame,
+                                                       scene.seed, distance))
+        if frame in frames:
+            yield frame, points
+
+
+def _placed_points(scene: Scene, particles: Any) -> Points:
+    """Particles in world units and world units per second."""
+    voxel = 1.0 / scene.shape[-2]
+    flat = np.zeros((len(particles.age), 3 - scene.dimension), np.float32)
+    position = np.array(domain_origin(scene.shape), np.float32) + np.float32(voxel) * particles.position
+    velocity = np.float32(voxel * scene.fps) * particles.velocity
+    vx, vy, vz = np.concatenate([velocity, flat], axis=-1).T
+    return {"position": np.concatenate([position, flat], axis=-1), "vx": np.ascontiguousarray(vx),
+            "vy": np.ascontiguousarray(vy), "vz": np.ascontiguousarray(vz), "age": particles.age}
+
+
+def _free_points(scene: Scene, points: Points) -> Any:
+    """The inverse of `_placed_points`, but for rounding."""
+    from synth.particles import Particles
+
+    voxel, kept = 1.0 / scene.shape[-2], slice(scene.dimension)
+    position = (points["position"][:, kept] - np.array(domain_origin(scene.shape), np.float32)) / np.float32(voxel)
+    velocity = np.stack([points["vx"], points["vy"], points["vz"]], axis=-1)[:, kept] / np.float32(voxel * scene.fps)
+    return Particles(position, velocity, points["age"])
+
+
+def write_points(file: Path, points: Points, scene: Scene) -> None:
+    """Write particles."""
+    attributes = dict(points)
+    meshes.write_points(file, attributes.pop("position"), attributes)
+
+
+def read_points(file: Path, scene: Scene) -> Points:
+    """Read particles that `write_points` wrote."""
+    return meshes.read_points(file)
+
+
 def write_mesh(file: Path, mesh: Mesh, scene: Scene) -> None:
     """Write a mesh."""
     meshes.write(file, **mesh)
@@ -168,21 +224,25 @@ TRANSFORM = ("synth.motion.combine", "synth.motion.frames", "synth.field")
 
 
 def products(scene: Scene) -> tuple[Product, ...]:
-    """F; and what is rendered: the density, the blades or nothing."""
+    """F; and what is rendered: the density, the particles, the blades or nothing."""
+    solid = obstacles.inputs(scene) if scene.combine.project else ()
     final = Product(
         name="F", stage="bake", folder="geometry", suffix=suffix, reads=("combine", *LOCAL_FRAME, "fps"),
-        inputs=(("L", "same"), ("H", "same"), *facing(scene, "same")), methods=TRANSFORM,
+        inputs=(("L", "same"), ("H", "same"), *facing(scene, "same"), *solid), methods=TRANSFORM,
         make=make_final, write=write_velocity, read=read_field)
+    every: tuple[tuple[str, Frames], ...] = (("L", "until"), ("H", "until"), *facing(scene, "until"))
     density = Product(
         name="density", stage="bake", folder="geometry", suffix=_density_suffix,
-        reads=("density", "combine", *LOCAL_FRAME, "seed", "fps"),
-        inputs=(("L", "until"), ("H", "until"), *facing(scene, "until")),
+        reads=("density", "combine", *LOCAL_FRAME, "seed", "fps"), inputs=(*every, *solid),
         methods=("synth.motion.density", "synth.motion.depth", *TRANSFORM), make=make_density, write=write_field,
         read=read_field)
+    particles = Product(
+        name="particles", stage="bake", folder="geometry", suffix=_ply,
+        reads=("particles", "combine", *LOCAL_FRAME, "seed", "fps"), inputs=(*every, *obstacles.inputs(scene)),
+        methods=("synth.particles", *TRANSFORM), make=make_particles, write=write_points, read=read_points)
     blades = Product(
         name="blades", stage="bake", folder="geometry", suffix=_ply,
-        reads=("blades", "combine", *LOCAL_FRAME, "seed", "fps"),
-        inputs=(("L", "until"), ("H", "until"), *facing(scene, "until")), methods=("synth.blades", *TRANSFORM),
-        make=make_blades, write=write_mesh, read=read_mesh)
-    moved = {"none": (), "seaweed": (blades,)}
+        reads=("blades", "combine", *LOCAL_FRAME, "seed", "fps"), inputs=(*every, *solid),
+        methods=("synth.blades", *TRANSFORM), make=make_blades, write=write_mesh, read=read_mesh)
+    moved = {"none": (), "seaweed": (blades,), "particles": (particles,)}
     return (final, *moved.get(scene.render.kind, (density,)))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import geometry
+from pipeline import geometry, obstacles
 from pipeline.fields import LOCAL_FRAME, facing
 from pipeline.files import images, pictures
 from pipeline.product import Frames, Product, Stock, value_at
@@ -64,6 +64,35 @@ def make_seaweed(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tupl
     for frame in frames:
         yield frame, seaweed.picture(**stock.read("blades", frame), settings=seaweed.Settings(
             width=wanted.width, height=wanted.height, spp=wanted.spp, seed=scene.seed, time=frame / scene.fps))
+
+
+def make_stage(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The river without foam: its bed and its stones."""
+    from render import particles
+
+    wanted: Any = scene.render
+    yield 0, particles.stage(_walls(scene, stock), wanted.width, wanted.spp, scene.seed)
+
+
+def _walls(scene: Scene, stock: Stock) -> np.ndarray:
+    """The distance to the obstacles, cells (Y, X); far from everywhere where there are none."""
+    away = obstacles.distance(scene, stock)
+    return np.full(scene.shape, np.float32(sum(scene.shape))) if away is None else away
+
+
+def make_river(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The particles as foam."""
+    from render import particles
+
+    wanted: Any = scene.render
+    back = stock.read("stage")
+    open_water = particles.shown(_walls(scene, stock), wanted.width)
+    domain = scene.shape[1] / scene.shape[0], 1.0
+    for frame in frames:
+        points = stock.read("particles", frame)
+        velocity = np.stack([points["vx"], points["vy"]], axis=-1)
+        yield frame, particles.river(points["position"][:, :2], velocity, points["age"], scene.particles.life, back,
+                                     open_water, domain, wanted.streak / scene.fps, wanted.white)
 
 
 @dataclass(frozen=True)
@@ -137,6 +166,14 @@ def _flat(values: np.ndarray, scene: Scene) -> np.ndarray:
     return values if values.ndim == 3 else lic.slice_of(values, scene.figure.plane)
 
 
+def _flat_walls(scene: Scene, stock: Stock) -> np.ndarray:
+    """The distance to the obstacles (Y, X), cells; in space that of the slice which panels show."""
+    from render import lic
+
+    away = _walls(scene, stock)
+    return away if away.ndim == 2 else lic.slice_of(np.repeat(away[..., None], 3, axis=-1), scene.figure.plane)[..., 0]
+
+
 def maker(panel: Shown) -> Callable[[Scene, Stock, list[int]], Iterator[tuple[int, np.ndarray]]]:
     """Makes the pictures of a field: lines, colour or arrows."""
 
@@ -147,6 +184,8 @@ def maker(panel: Shown) -> Callable[[Scene, Stock, list[int]], Iterator[tuple[in
         for frame in frames:
             values = field_values(panel, scene, stock, frame)
             shown = lic.colour(values, width) if panel.style == "colour" else lic.picture(values, width, scene.seed)
+            if scene.obstacles and panel.panel.partition("-")[0] != "exemplar":
+                shown = lic.with_solids(shown, _flat_walls(scene, stock))
             if panel.style == "arrows":
                 detail = panel.panel.startswith("detail")
                 wrong = _flat(stock.read("H", frame).values, scene) if detail else None
@@ -169,8 +208,8 @@ def with_arrows(picture: np.ndarray, right: np.ndarray, wrong: np.ndarray | None
 
 
 def products(scene: Scene) -> tuple[Product, ...]:
-    """The pictures that the scene's figure shows, and the smoke or the seaweed."""
-    made = {"none": [], "seaweed": [_seaweed()]}.get(scene.render.kind, [_smoke()])
+    """The pictures that the scene's figure shows, and the smoke, the particles or the seaweed."""
+    made = {"none": [], "seaweed": [_seaweed()], "particles": _river(scene)}.get(scene.render.kind, [_smoke()])
     for panel in dict.fromkeys(shown(scene)):
         if panel.panel == "result":
             continue
@@ -188,6 +227,8 @@ def products(scene: Scene) -> tuple[Product, ...]:
                 inputs, reads = (("L", "same"), ("H", "same"), *facing(scene, "same")), (*reads, *LOCAL_FRAME)
             case _:
                 inputs = (("F", "same"),)
+        if what not in ("input", "exemplar"):
+            inputs, reads = (*inputs, *obstacles.inputs(scene)), (*reads, "detail.size")
         make = make_input(panel) if what == "input" else maker(panel)
         made.append(Product(
             name=panel.picture, stage="render", folder="images", suffix=suffix, reads=reads, inputs=inputs,
@@ -201,6 +242,20 @@ def _smoke() -> Product:
         name="beauty", stage="render", folder="images", suffix=suffix, reads=("render", "seed"),
         inputs=(("density", "same"),), methods=("render.smoke",), make=make_beauty, write=write_light,
         read=read_light)
+
+
+def _river(scene: Scene) -> list[Product]:
+    solid = obstacles.inputs(scene)
+    stage = Product(
+        name="stage", stage="render", folder="images", suffix=suffix, animated=False,
+        reads=("render.width", "render.spp", "detail.size", "seed"), inputs=solid, methods=("render.particles",),
+        make=make_stage, write=write_light, read=read_light)
+    beauty = Product(
+        name="beauty", stage="render", folder="images", suffix=suffix,
+        reads=("render", "particles.life", "detail.size", "fps"),
+        inputs=(("particles", "same"), ("stage", "once"), *solid), methods=("render.particles",), make=make_river,
+        write=write_light, read=read_light)
+    return [stage, beauty]
 
 
 def _seaweed() -> Product:

@@ -69,7 +69,9 @@ class Product:
 
     def reads_files(self, scene: Scene) -> bool:
         """Whether its content depends on files that the scene names."""
-        return any(isinstance(getattr(value_at(scene, key), "file", None), Path) for key in self.reads)
+        tables = [value_at(scene, key) for key in self.reads]
+        several = [table for value in tables for table in (value if isinstance(value, tuple) else (value,))]
+        return any(isinstance(getattr(table, "file", None), Path) for table in several)
 
     def tables(self, scene: Scene) -> dict[str, Any]:
         """The values of `reads`, files by their content."""

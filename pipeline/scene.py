@@ -25,10 +25,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from pipeline.errors import BadInput
-from pipeline.schema import Scene, View, is_of_exemplar
+from pipeline.schema import Scene, ShapeObstacle, View, is_of_exemplar
 
 Raw = Mapping[str, Any]
-FLAT = ("lit", "ink")  # kinds of [render] that draw a plane
+FLAT = ("lit", "ink", "particles")  # kinds of [render] that draw a plane
 MOST_APART = 4  # at most so much larger is an exemplar than another: at the coarsest level a 9² neighbourhood sees both
 WORDS = (  # pydantic's for ours
     ("Input should", "should"),
@@ -220,7 +220,7 @@ def _did_you_mean(given: str, known: Any) -> str:
 
 def _fault_between_tables(scene: Scene) -> tuple[str, str]:
     """Dotted key and reason of values that are fine each and impossible together; ("", "") if all is well."""
-    for faults in (_flat_and_deep, _exemplar, _grids, _views, _shown):
+    for faults in (_flat_and_deep, _exemplar, _grids, _views, _obstacles, _shown):
         for key, reason in faults(scene):
             return key, reason
     return "", ""
@@ -259,7 +259,7 @@ def _flat_and_deep(scene: Scene) -> Faults:
             if chosen != default:
                 yield f"detail.{name}", f'"{chosen}" is for a field in the plane; detail.size is {size}'
         if render.kind in FLAT:
-            yield "render.kind", f'"{render.kind}" draws smoke in a plane; detail.size is {size}'
+            yield "render.kind", f'"{render.kind}" draws a plane; detail.size is {size}'
     if detail.samples == "lagrangian":
         if detail.search != "exact":
             yield "detail.search", "samples that move have no fixed neighbours for k-coherence to ask: say exact"
@@ -347,6 +347,27 @@ def _grids(scene: Scene) -> Faults:
     coarse = scene.coarse.size
     if any(n * coarse[1] != detail[1] * m for n, m in zip(detail, coarse, strict=True)):
         yield "detail.size", f"{_sized(detail)} has not the shape of coarse.size, {_sized(coarse)}"
+
+
+def _obstacles(scene: Scene) -> Faults:
+    """The obstacles, and the stone that a wake needs."""
+    for number, obstacle in enumerate(scene.obstacles):
+        if not isinstance(obstacle, ShapeObstacle):
+            continue
+        if len(obstacle.centre) != scene.dimension:
+            yield (f"obstacles[{number}].centre",
+                   f"has {len(obstacle.centre)} coordinates; detail.size is {_sized(scene.detail.size)}")
+        if len(obstacle.radius) not in (1, scene.dimension if obstacle.kind == "box" else 1):
+            yield f"obstacles[{number}].radius", f"has {len(obstacle.radius)} numbers for a {obstacle.kind}"
+    if scene.obstacles and scene.detail.boundary and scene.detail.samples == "lagrangian":
+        yield "detail.samples", "samples that move do not observe a boundary: say boundary = false"
+    if scene.coarse.kind == "wake":
+        if scene.dimension == 3:
+            yield "coarse.kind", f'"wake" is a flow of the plane; detail.size is {_sized(scene.detail.size)}'
+        if scene.stone is None:
+            yield "coarse.kind", '"wake" needs a stone, an [[obstacles]] with kind = "ball"'
+        if len(scene.coarse.lengths) != len(scene.coarse.gains):
+            yield "coarse.gains", f"{len(scene.coarse.gains)} gains for {len(scene.coarse.lengths)} lengths"
 
 
 def _shown(scene: Scene) -> Faults:

@@ -160,6 +160,22 @@ class AnalyticMotion(Table):
     angle: float = key("turns the whole pattern", 0.0, "degrees", ge=-360, le=360)
 
 
+class WakeMotion(Table):
+    """L of figure 7: a river past a round stone, the first [[obstacles]] with kind = "ball" ([Bridson et al. 2007])."""
+
+    kind: Literal["wake"] = key("a wake behind a stone")
+    size: Grid = grid("columns and rows of L", (200, 150))
+    flow: float = key("of the river along x", -0.25, "heights per unit of time", ge=-10, le=10)
+    influence: float = key("distance from the stone within which the river gives way", 0.25, "heights", gt=0, le=10)
+    expansion: float = key("how much the wake widens, to each side, per height downstream", 0.3, ge=0, le=10)
+    lengths: Annotated[tuple[Annotated[float, Field(gt=0, le=10)], ...], Strict(False)] = key(
+        "sizes of the features of each octave of noise in the wake", (0.1, 0.06, 0.026), "heights", max_length=8)
+    gains: Annotated[tuple[Annotated[float, Field(ge=0, le=10)], ...], Strict(False)] = key(
+        "amplitude of the potential of each octave", (0.03, 0.0105, 0.003), "heights² per unit of time", max_length=8)
+    step: float = key("time from frame to frame", 0.04, "units of time", gt=0, le=10)
+    period: float = key("in which the noise turns over", 25.0, "frames", gt=0, le=100000)
+
+
 class FileMotion(Table):
     """L from a file."""
 
@@ -206,6 +222,7 @@ class Detail(Table):
         "[[detail.directions]] say", "camera")
     directions: Annotated[tuple[Direction, ...], Strict(False)] = key(
         "an array of tables [[detail.directions]], for facing = \"directions\"", (), max_length=256)
+    boundary: bool = key("observe the boundary of the obstacles: E_n (§3.6, Eq. 3)", True)
 
 
 Triple = tuple[float, float, float]
@@ -252,12 +269,45 @@ def _solid(exemplar: Exemplar | None) -> bool:
     return isinstance(exemplar, FieldExemplar) and exemplar.solid
 
 
+class ShapeObstacle(Table):
+    """A solid in the flow (§3.6, figure 7). Several are one."""
+
+    kind: Literal["ball", "box"] = key("its form; a ball in the plane is a disc")
+    centre: Annotated[tuple[float, ...], Strict(False)] = key(
+        "(x, y), in 3-D (x, y, z)", ..., "heights", min_length=2, max_length=3)
+    radius: Annotated[tuple[Annotated[float, Field(gt=0, le=10)], ...], Strict(False), BeforeValidator(_several)] = key(
+        "of the ball, or half the box's edge; of a box one number, or one for each axis", ..., "heights",
+        min_length=1, max_length=3)
+    angle: float = key("turns a box in the plane of x and y", 0.0, "degrees", ge=-360, le=360)
+
+
+class PictureObstacle(Table):
+    """Solids from a picture (figure 8: "object contours"); in 3-D prisms along z."""
+
+    kind: Literal["mask", "drawing"] = key("white is solid, or ink and what ink encloses is")
+    file: Asset = key("PNG; of a drawing SVG too, what its closed paths enclose")
+    centre: Annotated[tuple[float, float], Strict(False)] = key("of the picture", (0.0, 0.5), "heights")
+    height: float = key("of the picture", 1.0, "heights", gt=0, le=10)
+
+
+class LevelSetObstacle(Table):
+    """A solid modelled elsewhere, where it stands in its own coordinates; in 2-D its section at z = 0."""
+
+    kind: Literal["level-set"] = key("a level set")
+    file: Asset = key("VDB, of any origin")
+    grid: str = key("its grid of class level set", "surface", min_length=1, max_length=200)
+
+
+Obstacle = Annotated[ShapeObstacle | PictureObstacle | LevelSetObstacle, Field(discriminator="kind")]
+
+
 class Combine(Table):
     """F = upsample(L) + ω H' (§3.5)."""
 
     omega: float = key("ω, the length of the exemplar's longest vector in F", ..., "cells per frame", ge=0, le=1000)
     weight: Literal["uniform", "kinetic-energy", "vorticity"] = key("what ω is proportional to in space", "uniform")
-    project: bool = key("make F divergence-free (§3.6, incompressibility)", False)
+    project: bool = key("make F divergence-free and let nothing flow through obstacles (§3.6, incompressibility); over "
+                        "the border it flows freely but where L is smoke in its box", False)
 
 
 class Source(Table):
@@ -309,6 +359,13 @@ class Blades(Table):
     window: int = key("whose motion a tip follows; half of it is its lag", 9, "frames", ge=1, le=100)
 
 
+class Particles(Table):
+    """Particles that F carries, for [render] kind = "particles" (figure 7)."""
+
+    count: int = key("how many", 40000, ge=1, le=10000000)
+    life: int = key("after which one is born again elsewhere", 60, "frames", ge=2, le=100000)
+
+
 class LitRender(Table):
     """2-D smoke, lit in its own plane."""
 
@@ -344,6 +401,16 @@ class SeaweedRender(Table):
     width: int = key("of the picture", 960, "pixels", ge=16, le=LARGEST)
     height: int = key("of the picture", 540, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
+
+
+class ParticlesRender(Table):
+    """The particles as foam on a river, seen from above; obstacles are stones, path-traced once by Mitsuba."""
+
+    kind: Literal["particles"] = key("foam on a river")
+    width: int = key("of the picture (figure 7: 640×480)", 640, "pixels", ge=16, le=LARGEST)
+    spp: int = key("paths per pixel of the stones", 128, ge=1, le=65536)
+    streak: float = key("length of a streak, in time", 1.2, "frames", ge=0, le=100)
+    white: float = key("speed at which foam is white", 0.7, "heights per second", gt=0, le=1000)
 
 
 class NoRender(Table):
@@ -385,14 +452,18 @@ class Scene(Table):
     frames: int = key("length of the animation", 90, "frames", ge=1, le=100000)
     fps: float = key("speed of the animation", 30, "frames per second", gt=0, le=1000)
     exemplar: Exemplar = Field(discriminator="kind")
-    coarse: SmokeMotion | NoiseMotion | AnalyticMotion | FileMotion = Field(discriminator="kind")
+    coarse: SmokeMotion | NoiseMotion | WakeMotion | AnalyticMotion | FileMotion = Field(discriminator="kind")
     views: Annotated[tuple[View, ...], Strict(False)] = key(
         "in 3-D, an array of tables [[views]]; none: front, side and top of [exemplar]", (), max_length=16)
     detail: Detail = Detail()
+    obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = key(
+        "solids in the flow, an array of tables [[obstacles]]", (), max_length=64)
     combine: Combine
     density: Density = Density()
+    particles: Particles = Particles()
     blades: Blades = Blades()
-    render: LitRender | InkRender | VolumeRender | SeaweedRender | NoRender = Field(discriminator="kind")
+    render: LitRender | InkRender | VolumeRender | ParticlesRender | SeaweedRender | NoRender = Field(
+        discriminator="kind")
     figure: Figure = Figure()
 
     @property
@@ -404,6 +475,11 @@ class Scene(Table):
     def shape(self) -> tuple[int, ...]:
         """Cells of H and F as arrays count them, (Y, X) or (Z, Y, X)."""
         return self.detail.size[::-1]
+
+    @property
+    def stone(self) -> ShapeObstacle | None:
+        """The first round obstacle, which a wake is behind."""
+        return next((o for o in self.obstacles if isinstance(o, ShapeObstacle) and o.kind == "ball"), None)
 
     @property
     def seen(self) -> tuple[View, ...]:

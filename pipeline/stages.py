@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pipeline import fields, geometry, manifest, panels, sources
+from pipeline import fields, geometry, manifest, obstacles, panels, sources
 from pipeline.errors import BadInput
 from pipeline.manifest import Entry, Folder
 from pipeline.product import Product
@@ -25,7 +25,8 @@ VERBS = ("synth", "bake", "render", "figure")
 
 def products(scene: Scene) -> dict[str, Product]:
     """All products of a scene, by name, each after those it is made from."""
-    return {p.name: p for p in (*fields.products(scene), *geometry.products(scene), *panels.products(scene))}
+    made = (*obstacles.products(scene), *fields.products(scene), *geometry.products(scene), *panels.products(scene))
+    return {p.name: p for p in made}
 
 
 class Works:

@@ -48,6 +48,22 @@ def _checked(v: np.ndarray) -> np.ndarray:
     return np.asarray(v, np.float32)
 
 
+SOLID = 0.80  # display grey of an obstacle
+OUTLINE = 1.6  # pixels, of the line round it
+
+
+def with_solids(picture: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """Display values (h, w, 3) of a field's picture with obstacles over it, plain grey with a dark line round them.
+
+    distance  (Y, X), cells to their walls, negative inside
+    """
+    height, width = picture.shape[:2]
+    away = resampled(distance.astype(np.float32), height, width)[::-1] * (height / distance.shape[0])
+    inside = np.clip(0.5 - away, 0, 1)[..., None]
+    line = np.clip(OUTLINE - np.abs(away), 0, 1)[..., None]
+    return (picture * (1 - inside) + SOLID * inside) * (1 - 0.85 * line)
+
+
 def height_for(shape: tuple[int, ...], width: int) -> int:
     """Rows of a picture `width` pixels wide of a field or density of `shape` (Y, X, ...)."""
     return max(1, round(width * shape[0] / shape[1]))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, film
+from render import backend, film, lic
 from synth.noise import gradient_noise
 
 # the stones, in heights of the picture: how wide their shoulder is at most, and how high it rises over its width
@@ -40,17 +40,12 @@ FADE = 8.0  # frames in which a particle appears and vanishes
 SHADE = 0.75  # how much of the stones' shadow falls on foam
 
 
-def picture_height(shape: tuple[int, ...], width: int) -> int:
-    """Rows of pixels of a picture `width` wide of a field (Y, X)."""
-    return max(1, round(width * shape[0] / shape[1]))
-
-
 def stage(distance: np.ndarray, width: int, spp: int, seed: int) -> np.ndarray:
     """Bed and stones without foam: light (h, w, 3), path traced by Mitsuba with `spp` paths a pixel.
 
     distance  (Y, X) float32, cells to the wall of the obstacles, negative inside
     """
-    height = picture_height(distance.shape, width)
+    height = lic.height_for(distance.shape, width)
     mi = backend.mitsuba("scalar_rgb")
     aspect = distance.shape[1] / distance.shape[0]
     sun = np.array(KEY) / np.linalg.norm(KEY)
@@ -92,7 +87,7 @@ def relief(depth: np.ndarray, x: np.ndarray, y: np.ndarray, seed: int) -> np.nda
 
 
 def _bed(mi: Any, distance: np.ndarray, height: int, seed: int) -> Any:
-    """Water and stones as one relief with a colour at each vertex, about a vertex a pixel, a little beyond the picture."""
+    """Water and stones as one relief, about a vertex a pixel, each with its colour; a little beyond the picture."""
     rows, columns = distance.shape
     beyond = max(2, height // 16)
     counts = height + 2 * beyond + 1, round(height * columns / rows) + 2 * beyond + 1
@@ -137,13 +132,10 @@ def _coloured(mi: Any, points: np.ndarray, colour: np.ndarray) -> Any:
 
 
 def shown(distance: np.ndarray, width: int) -> np.ndarray:
-    """The share (h, w) float32 of each pixel that no obstacle covers."""
-    height = picture_height(distance.shape, width)
-    rows, columns = distance.shape
-    y = (height - np.arange(height) - 0.5)[:, None] * rows / height - 0.5
-    x = (np.arange(width) + 0.5)[None] * columns / width - 0.5
-    away = ndimage.map_coordinates(distance, np.broadcast_arrays(y, x), order=1, mode="nearest")
-    return np.clip(away * height / rows + 0.5, 0, 1).astype(np.float32)
+    """The share (h, w) float32 of each pixel, top row first, that no obstacle covers; distance (Y, X) in cells."""
+    height = lic.height_for(distance.shape, width)
+    away = lic.resampled(distance, height, width)[::-1] * (height / distance.shape[0])
+    return np.clip(away + 0.5, 0, 1).astype(np.float32)
 
 
 def foam_colour(speed: np.ndarray) -> np.ndarray:
@@ -154,8 +146,8 @@ def foam_colour(speed: np.ndarray) -> np.ndarray:
     return np.maximum(film.oklab_to_linear(oklab), 0)
 
 
-def river(position: np.ndarray, velocity: np.ndarray, age: np.ndarray, life: int, back: np.ndarray, open_water: np.ndarray,
-          domain: tuple[float, float], streak: float, white: float) -> np.ndarray:
+def river(position: np.ndarray, velocity: np.ndarray, age: np.ndarray, life: int, back: np.ndarray,
+          open_water: np.ndarray, domain: tuple[float, float], streak: float, white: float) -> np.ndarray:
     """A frame: particles as streaks over the stage `back` (h, w, 3), where `open_water` (h, w) lets them be seen.
 
     position  (N, 2) world units; velocity (N, 2) world units per second; age (N,) frames of a life of `life`

@@ -105,12 +105,12 @@ def drawn(tones: np.ndarray) -> np.ndarray:
     return ndimage.binary_fill_holes(difference > INK * difference.max()).astype(np.float32)
 
 
-def outlines(polygons: Sequence[np.ndarray], rows: int) -> np.ndarray:
-    """What closed polygons (N, 2) of x, y in [0, columns / rows] x [0, 1] enclose, as a mask for `picture`.
+def outlines(polygons: Sequence[np.ndarray], shape: tuple[int, int]) -> np.ndarray:
+    """What closed polygons (N, 2) of x, y enclose, as a mask of `shape` (rows, columns) for `picture`.
 
-    One pixel of it is 1 / rows; it is as wide as the polygons reach.
+    It reaches from 0 to 1 along y, and a pixel is 1 / rows wide too.
     """
-    columns = max(1, int(np.ceil(rows * max(float(p[:, 0].max()) for p in polygons))))
+    rows, columns = shape
     inside = np.zeros((rows, columns), bool)
     for polygon in polygons:
         ahead = np.roll(polygon, -1, axis=0)

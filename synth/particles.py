@@ -60,7 +60,7 @@ def moved(particles: Particles, before: np.ndarray, after: np.ndarray, life: int
     position = particles.position
     for step in range(STEPS):
         times = (step / STEPS, (step + 0.5) / STEPS, (step + 1) / STEPS)
-        motions = [((1 - t) * before + t * after) / STEPS for t in np.float32(times)]
+        motions = [(np.float32((1 - t) / STEPS) * before + np.float32(t / STEPS) * after) for t in times]
         k1 = sampled(motions[0], position)
         k2 = sampled(motions[1], position + k1 / 2)
         k3 = sampled(motions[1], position + k2 / 2)

@@ -14,6 +14,7 @@ from synth.motion.exemplar import (
     from_field,
     from_svg,
     from_volume,
+    svg_outlines,
 )
 
 SIZES = (16, 32, 33, 64, 128)
@@ -419,3 +420,14 @@ def test_assets_make_exemplars():
     assert at(leaf, 0.5, 0.42) == pytest.approx([0, 1], abs=0.1)
     np.testing.assert_allclose(leaf[:, ::-1] * np.float32([-1, 1]), leaf, atol=1e-5)
     assert all(f.stat().st_size < 300_000 for f in ASSETS.iterdir())
+
+
+def test_closed_paths_are_contours_in_their_viewbox():
+    text = ('<svg xmlns="http://www.w3.org/2000/svg" viewBox="10 20 200 100"><path d="M60 45 h50 v50 h-50 z"/>'
+            '<path d="M0 0 L5 5"/></svg>')
+    (square,), width = svg_outlines(text)
+    assert width == 2.0
+    np.testing.assert_allclose((square.min(0), square.max(0)), ((0.5, 0.25), (1.0, 0.75)), atol=1e-9)
+    for bad in ("<svg", text.replace(" z", "")):
+        with pytest.raises(ValueError, match="SVG"):
+            svg_outlines(bad)

@@ -140,3 +140,11 @@ def test_slice_of_a_volume() -> None:
 def test_what_is_no_field_is_refused(bad: np.ndarray) -> None:
     with pytest.raises(ValueError, match="field"):
         lic.picture(bad, 32)
+
+
+def test_a_solid_is_plain_and_has_a_line_round_it():
+    y, x = np.mgrid[:20, :30]
+    distance = np.hypot(x - 14.5, y - 12.5) - 5
+    shown = lic.with_solids(np.full((60, 90, 3), 0.5, np.float32), distance)
+    assert np.allclose(shown[60 - 39, 45], lic.SOLID) and np.allclose(shown[50, 80], 0.5)  # y up
+    assert shown.min() < 0.2

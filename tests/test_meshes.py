@@ -68,3 +68,19 @@ def test_a_full_disk_is_noticed(tiny_disk: Path) -> None:
     with pytest.raises(StorageFailed, match="the disk is full"):
         meshes.write(tiny_disk / "a.ply", many, FACES)
     assert list(tiny_disk.iterdir()) == []
+
+
+def test_points_come_back_with_what_they_carry(tmp_path: Path) -> None:
+    attributes = {"vx": np.array([1, -2, 1e-7], np.float32), "age": np.array([0, 7, -3], np.int32)}
+    meshes.write_points(tmp_path / "a.ply", VERTICES[:3], attributes)
+    back = meshes.read_points(tmp_path / "a.ply")
+    assert np.array_equal(back["position"], VERTICES[:3]) and set(back) == {"position", "vx", "age"}
+    assert all(np.array_equal(back[name], values) and back[name].dtype == values.dtype
+               for name, values in attributes.items())
+    (tmp_path / "b.ply").write_bytes((tmp_path / "a.ply").read_bytes()[:-4])
+    with pytest.raises(BadInput, match=r"b\.ply: damaged"):
+        meshes.read_points(tmp_path / "b.ply")
+    with pytest.raises(ValueError, match="as many as these, 3"):
+        meshes.write_points(tmp_path / "c.ply", VERTICES[:3], {"age": np.zeros(2, np.int32)})
+    with pytest.raises(ValueError, match="finite"):
+        meshes.write_points(tmp_path / "c.ply", VERTICES[:3] * np.nan, {})

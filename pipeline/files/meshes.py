@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,44 @@ def write(path: Path, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarr
             written["colours"] = colours
         if not all(np.array_equal(back[name], array) for name, array in written.items()):
             raise StorageFailed(path, "did not read back as it was written; is the disk full?")
+
+
+def write_points(path: Path, position: np.ndarray, attributes: Mapping[str, np.ndarray]) -> None:
+    """Write points (N, 3) float32, world units, each with attributes (N,) float32 or int32, as binary PLY.
+
+    Raises ValueError for other shapes, NaN or infinity; `StorageFailed` if the file does not read back.
+    """
+    import trimesh
+
+    for name, values in {"positions": position, **attributes}.items():
+        if len(values) != len(position) or not len(values) or not np.isfinite(values).all():
+            raise ValueError(f"{name} of points are finite and as many as these, {len(position)}; not {values.shape}")
+    cloud = trimesh.Trimesh(position, process=False, vertex_attributes=dict(attributes))
+    with atomic.replacing(path) as temporary:
+        temporary.write_bytes(cloud.export(file_type="ply", vertex_normal=False))
+        try:
+            back = read_points(temporary)
+        except BadInput as error:
+            raise StorageFailed(path, f"did not read back ({error.reason}); is the disk full?") from error
+        written = {"position": position, **attributes}
+        if not all(np.array_equal(back[name], values) for name, values in written.items()):
+            raise StorageFailed(path, "did not read back as it was written; is the disk full?")
+
+
+def read_points(path: Path) -> dict[str, np.ndarray]:
+    """What `write_points` wrote: "position" (N, 3) float32, and the attributes by their names.
+
+    Reads in this process, for files of our own. Raises `BadInput` if it is missing or damaged.
+    """
+    import trimesh
+
+    try:
+        with path.open("rb") as file:
+            stored = trimesh.load(file, file_type="ply", process=False).metadata["_ply_raw"]["vertex"]["data"]
+    except Exception as error:  # trimesh raises anything at a file cut short
+        raise BadInput(path, "", f"damaged: {error}") from error
+    found = {name: np.ascontiguousarray(stored[name]) for name in stored.dtype.names}
+    return {"position": np.stack([found.pop(axis) for axis in "xyz"], axis=-1), **found}
 
 
 def _require_mesh(vertices: np.ndarray, faces: np.ndarray) -> None:

@@ -1,4 +1,5 @@
-"""OpenVDB files: 3-D fields in world units, grids `density` (fog volume) and `vel` (world units per second).
+"""OpenVDB files: 3-D fields in world units, grids `density` (fog volume), `vel` (world units per second) and `surface`
+(level set).
 
 Index (i, j, k) of a grid is (x, y, z) of an array (Z, Y, X); the transform takes it to the centre of that
 cell in the world: voxel_size * (i, j, k) + origin. OpenVDB keeps only voxels that are not zero, so the full
@@ -23,15 +24,17 @@ from synth.field import Field
 
 SHAPE = "flowloom_shape"  # grid metadata: cells along x, y, z
 VOXEL_SIZE = "flowloom_voxel_size"  # grid metadata: OpenVDB changes the last bit when it reads a transform
+LEVEL_SET = "level set"  # as OpenVDB calls the class of a grid
 MOST_VOXELS = 1024**3
 _UUID = slice(21, 57)  # where the header holds a random name of the file
 
 
 def write(path: Path, fields: Mapping[str, Field], *, metadata: Mapping[str, str] | None = None,
-          half: bool = False) -> None:
+          half: bool = False, level_set: bool = False) -> None:
     """Write 3-D fields of one grid to `path`, read them back and compare, then rename into place.
 
-    half    stores 16 bits per number: three decimal digits, up to 65,504
+    half       stores 16 bits per number: three decimal digits, up to 65,504
+    level_set  the scalars are distances, negative inside
 
     Raises ValueError for fields that are not 3-D, lie on different grids or do not fit into half floats;
     `StorageFailed` if the file does not read back.
@@ -48,7 +51,7 @@ def write(path: Path, fields: Mapping[str, Field], *, metadata: Mapping[str, str
     from pipeline.files import _openvdb
 
     shape = " ".join(str(n) for n in reversed(first.shape))
-    about = {SHAPE: shape, VOXEL_SIZE: repr(first.voxel_size)}
+    about = {SHAPE: shape, VOXEL_SIZE: repr(first.voxel_size)} | ({"class": LEVEL_SET} if level_set else {})
     grids = [(name, field.values, about) for name, field in fields.items()]
     with atomic.replacing(path) as temporary:
         try:
@@ -131,13 +134,28 @@ def read_foreign(path: Path, name: str) -> Field:
         raise BadInput(path, name, str(error)) from error
 
 
-def _grid(path: Path, name: str) -> dict[str, Any]:
+def read_level_set(path: Path, name: str, key: str) -> Field:
+    """The distances of level set `name` of anybody's VDB file, read in a child process: its active voxels and those
+    between them. `key` is the scene's, for the error.
+
+    Raises `BadInput`: no such file or grid, no level set, damaged, not read here (see above), NaN or infinity.
+    """
+    grid = shelter.read(_grid, path, key, name, LEVEL_SET)
+    try:
+        return _field(grid)
+    except ValueError as error:
+        raise BadInput(path, key, str(error)) from error
+
+
+def _grid(path: Path, name: str, of_class: str = "") -> dict[str, Any]:
     """Runs in the child: the grid's values, voxel size and origin, or ValueError."""
     from pipeline.files import _openvdb
 
     grids, _ = _openvdb.contents(str(path))
     for grid in grids:
         if grid["name"] == name:
+            if of_class not in ("", grid["metadata"].get("class")):
+                raise ValueError(f"grid '{name}' is no {of_class}, but of class {grid['metadata'].get('class')}")
             return _values(path, grid)
     raise ValueError(f"no such grid; the file holds: {', '.join(g['name'] for g in grids) or 'none'}")
 

@@ -16,7 +16,7 @@ WEIGHTS = ("kinetic-energy", "vorticity")
 
 
 def combine(L: np.ndarray, H: np.ndarray, omega: float, weight: str | None = None,
-            projection: str | None = None) -> np.ndarray:
+            projection: str | None = None, distance: np.ndarray | None = None) -> np.ndarray:
     """F = upsample(L) + omega * weight * H.
 
     L           (Y, X, 2) or (Z, Y, X, 3) float32, cells per frame of its own, coarser grid
@@ -27,7 +27,8 @@ def combine(L: np.ndarray, H: np.ndarray, omega: float, weight: str | None = Non
     weight      None: omega everywhere; "kinetic-energy" or "vorticity": omega in proportion to that of L,
     with mean
                 omega over the domain (zero where L is zero throughout)
-    projection  None, or the border ("wall", "open", "toroidal") of the exact projection of F (§3.6)
+    projection  None, or the border ("wall", "open", "toroidal") of the projection of F (§3.6)
+    distance    cells to the wall of an obstacle, negative inside, that the projection lets nothing flow through
     Returns F, H's shape, float32, cells per frame of the output grid.
     """
     shape = H.shape[:-1]
@@ -38,7 +39,7 @@ def combine(L: np.ndarray, H: np.ndarray, omega: float, weight: str | None = Non
         raise ValueError(f"omega must be finite, not {omega}")
     F = coarse + np.float32(omega) * H if weight is None else (
         coarse + np.float32(omega) * weight_of(coarse, weight)[..., None] * H)
-    return F if projection is None else project(F, projection)
+    return F if projection is None else project(F, projection, distance)
 
 
 def weight_of(v: np.ndarray, weight: str) -> np.ndarray:

@@ -310,6 +310,32 @@ def from_svg(text: str, size: int) -> Array:
     (entities), more than 1,000,000 characters or 20,000 segments, or nothing drawn in it.
     """
     _check_size(size)
+    strokes, corner, extent = _svg_drawn(text)
+    offset = (extent.max() - extent) / 2 - corner
+    flip = np.array([1.0, -1.0])  # SVG's y points down
+    strokes = [((s + offset) / extent.max() - 0.5) * flip + 0.5 for s in strokes]
+    return _unit(_along(strokes, size, STROKE_REACH))
+
+
+def svg_outlines(text: str) -> tuple[list[Floats], float]:
+    """The closed paths of a vector drawing, as contours of obstacles (ma09 figure 8: "object contours").
+
+    text: the SVG document, as `from_svg`. Returns polygons (n, 2) of x, y, y upwards, where the viewBox, or
+    the drawing where there is none, is 1 high; and how wide it is. Raises ValueError as `from_svg`, and where no
+    path is closed.
+    """
+    strokes, corner, extent = _svg_drawn(text)
+    if not extent.min() > 0:
+        raise ValueError("the SVG encloses nothing: its viewBox has no area")
+    closed = [s for s in strokes if np.linalg.norm(s[0] - s[-1]) < 1e-3 * extent.max()]
+    if not closed:
+        raise ValueError("the SVG encloses nothing: none of its paths is closed")
+    return [(s - corner) / extent[1] * np.array([1.0, -1.0]) + np.array([0.0, 1.0]) for s in closed], float(
+        extent[0] / extent[1])
+
+
+def _svg_drawn(text: str) -> tuple[list[Floats], Floats, Floats]:
+    """The paths of a document in its own units, y downwards; lower corner and extent of what it shows."""
     if len(text) > SVG_CHARACTERS:
         raise ValueError(f"the SVG has {len(text)} characters; at most {SVG_CHARACTERS}")
     if re.search(r"<!\s*(DOCTYPE|ENTITY)", text, re.IGNORECASE):
@@ -320,10 +346,7 @@ def from_svg(text: str, size: int) -> Array:
     corner, extent = box if box else _bounds(strokes)
     if not (np.isfinite(extent).all() and extent.max() > 0):
         raise ValueError("the SVG's extent is not a positive number")
-    offset = (extent.max() - extent) / 2 - corner
-    flip = np.array([1.0, -1.0])  # SVG's y points down
-    strokes = [((s + offset) / extent.max() - 0.5) * flip + 0.5 for s in strokes]
-    return _unit(_along(strokes, size, STROKE_REACH))
+    return strokes, corner, extent
 
 
 def _svg_strokes(text: str) -> tuple[list[Floats], tuple[Floats, Floats] | None]:
