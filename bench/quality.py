@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict
 from typing import Any
@@ -44,8 +44,8 @@ def met(found: dict[str, Any]) -> bool:
     return 0.85 <= found["rms"] <= 1.15 and found["used"] >= 0.45 and closed
 
 
-def _random_start(exemplar: np.ndarray, frame: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    return initialize.random_pixels(exemplar, frame.shape[:2], random)
+def _random_starts(exemplar: np.ndarray, frame: np.ndarray, randoms: Sequence[np.random.Generator]) -> list[np.ndarray]:
+    return [initialize.random_pixels(exemplar, frame.shape[:2], random) for random in randoms]
 
 
 def _not_sown(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray:
@@ -55,14 +55,14 @@ def _not_sown(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray) -> np.ndar
 # what is taken away, and the settings it is tried with
 WITHOUT: dict[str, tuple[Callable[[], AbstractContextManager[Any]], dict[str, Any]]] = {
     "all of it": (nullcontext, {}),
-    "random pixels instead of mosaics (ma09 §3.4)": (lambda: patch.object(initialize, "mosaic", _random_start), {}),
+    "random pixels instead of mosaics (ma09 §3.4)": (lambda: patch.object(initialize, "mosaics", _random_starts), {}),
     "one mosaic instead of the best of eight": (lambda: patch.object(detail, "STARTS", 1), {}),
     "no exemplar sown where it is empty": (lambda: patch.object(initialize, "reseed", _not_sown), {}),
     "three levels (ma09 §4), not as many as bring it down to 8²": (nullcontext, {"levels": 3}),
     "two levels": (nullcontext, {"levels": 2}),
     "k-coherence instead of exact search": (nullcontext, {"search": "k-coherence"}),
     "none of it: random pixels, nothing sown, three levels": (
-        lambda: patch.multiple(initialize, mosaic=_random_start, reseed=_not_sown), {"levels": 3}),
+        lambda: patch.multiple(initialize, mosaics=_random_starts, reseed=_not_sown), {"levels": 3}),
 }
 
 

@@ -16,7 +16,7 @@ from synth.motion import initialize
 
 ROBUST, EXACT, EDGE = 0.8, 0.05, 0.1
 VARIANCE_KEPT, MOST_DIMS = 0.995, 64
-MARGIN, STARTS = 8, 8
+MARGIN, STARTS, NEAREST = 8, 8, 8
 
 
 def sampled(field: np.ndarray, x: np.ndarray, y: np.ndarray, mode: str) -> np.ndarray:
@@ -90,14 +90,46 @@ def optimized(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray, near: dict
     return H, distance
 
 
+def owners(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For each of cells (P, 2) the one of the eight nearest centres whose turned square holds it best, and the
+    offset in that square's frame."""
+    _, index = cKDTree(centres).query(cells, k=min(NEAREST, len(centres)))
+    index = index.reshape(len(cells), -1)
+    at = np.rint(centres).astype(int)
+    e = frame[np.clip(at[:, 1], 0, frame.shape[0] - 1), np.clip(at[:, 0], 0, frame.shape[1] - 1)][index]
+    way = (cells[:, None] - centres[index]).reshape(-1, 2, 1)
+    offset = np.stack(turned(e.reshape(-1, 2) * [1, -1], way[:, 0], way[:, 1]), axis=-1).reshape(*index.shape, 2)
+    nearest = np.abs(offset).max(axis=-1).argmin(axis=1)
+    rows = np.arange(len(cells))
+    return index[rows, nearest], offset[rows, nearest]
+
+
+def mosaic(exemplar: np.ndarray, frame: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Whole exemplars as the tiles of a mosaic that follows the frame: `initialize.mosaics` in plain NumPy."""
+    size = exemplar.shape[0]
+    rows, columns = frame.shape[:2]
+    cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1)
+    count = max(1, round(initialize.CROWDING * rows * columns / size**2))
+    centres = random.random((count, 2), dtype=np.float32) * [columns - 1, rows - 1]
+    stride = max(1, size // 8)
+    some = cells[::stride, ::stride].reshape(-1, 2)
+    for _ in range(initialize.RELAXATIONS):
+        tile, _ = owners(some, centres, frame)
+        members = np.bincount(tile, minlength=count)
+        sums = np.stack([np.bincount(tile, some[:, i], minlength=count) for i in (0, 1)], axis=-1)
+        centres = np.where(members[:, None] > 0, sums / np.maximum(members, 1)[:, None], centres)
+    _, offset = owners(cells.reshape(-1, 2), centres, frame)
+    at = np.rint(offset + (size - 1) / 2).astype(int) % size
+    return exemplar[at[:, 1], at[:, 0]].reshape(rows, columns, 2)
+
+
 def start(exemplar: np.ndarray, frame: np.ndarray, near: dict[int, Neighborhoods], iterations: int, rms: float,
           seed: int) -> np.ndarray:
     """The mosaic that promises most after half the iterations."""
     best, least = exemplar, np.inf
     for trial in range(STARTS):
         random = np.random.Generator(np.random.Philox(key=[seed, trial]))
-        mosaic = initialize.mosaic(exemplar, frame, random)
-        H, distance = optimized(mosaic, exemplar, frame, near, (iterations + 1) // 2, rms)
+        H, distance = optimized(mosaic(exemplar, frame, random), exemplar, frame, near, (iterations + 1) // 2, rms)
         inside = H[MARGIN:-MARGIN, MARGIN:-MARGIN]
         score = distance + abs(np.sqrt(np.mean(inside**2) / np.mean(exemplar**2)) - 1)
         if score < least:

@@ -114,10 +114,18 @@ def program(source: Path, **defines: Any) -> Program:
 
 
 def to_device(values: np.ndarray) -> Any:
-    """A device array holding a C-order copy of `values`; `.get()` brings it back."""
+    """A device array holding a C-order copy of `values`; `.get()` brings it back.
+
+    Copied at once and not by the queue: it does not wait for what the device was given before.
+    """
+    import pyopencl as cl
     import pyopencl.array as cl_array
 
-    return cl_array.to_device(_queue(), np.ascontiguousarray(values))
+    host = np.ascontiguousarray(values)
+    if host.size == 0:
+        return cl_array.empty(_queue(), host.shape, host.dtype)
+    buffer = cl.Buffer(_queue().context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=host)
+    return cl_array.Array(_queue(), host.shape, host.dtype, data=buffer)
 
 
 def empty(shape: tuple[int, ...] | int, dtype: Any = np.float32) -> Any:

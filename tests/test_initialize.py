@@ -4,12 +4,17 @@ import numpy as np
 import pytest
 
 from synth.motion.exemplar import exemplar
-from synth.motion.initialize import mosaic, random_pixels, reseed
+from synth.motion.frames import local_frame
+from synth.motion.initialize import mosaics, owners, owners_reference, random_pixels, reseed
 from synth.motion.quality import measure, whole_motifs
 
 
 def generator(seed=0):
     return np.random.Generator(np.random.Philox(key=seed))
+
+
+def mosaic(I, frame, random):
+    return mosaics(I, frame, [random])[0]
 
 
 def along(angle, shape):
@@ -70,6 +75,31 @@ def test_a_mosaic_uses_the_exemplar_better_than_random_pixels():
     thrown = measure(random_pixels(I, (96, 96), generator()), frame, I)
     assert laid.forward < 0.7 * thrown.forward
     assert laid.used > 0.95 > 0.2 > thrown.used
+
+
+@pytest.mark.parametrize(("shape", "edge", "count"), [((5, 7), 3, 4), ((2, 2), 8, 1), ((1, 9), 2, 3),
+                                                      ((61, 40), 8, 35), ((61, 40), 2, 3)])
+def test_owners_equal_their_reference(shape, edge, count):
+    """Near or far, many or few of them, crowded into a corner or spread."""
+    random = generator(6)
+    frame = local_frame(random.standard_normal((*shape, 2), dtype=np.float32))
+    last = np.array(shape[::-1], np.float32) - 1
+    centres = random.random((3, count, 2), dtype=np.float32) * last
+    centres[2] *= np.float32(0.1)
+    cells = np.argwhere(np.ones(shape))[:, ::-1].astype(np.float32)
+    owner, offset = owners(cells, centres, frame, edge)
+    expected, way = owners_reference(cells, centres, frame)
+    np.testing.assert_allclose(np.abs(offset).max(-1), np.abs(way).max(-1), atol=1e-4)
+    same = owner == expected  # two may be as near
+    assert same.mean() > 0.99
+    np.testing.assert_allclose(offset[same], way[same], atol=1e-4)
+
+
+def test_mosaics_laid_together_are_those_laid_alone():
+    I, frame = exemplar("heart", 16), curved(70)
+    together = mosaics(I, frame, [generator(seed) for seed in range(3)])
+    for seed, laid in enumerate(together):
+        np.testing.assert_array_equal(laid, mosaic(I, frame, generator(seed)))
 
 
 def test_nothing_is_sown_where_nothing_is_empty():

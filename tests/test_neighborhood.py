@@ -9,6 +9,7 @@ from synth.motion.exemplar import exemplar
 from synth.motion.neighborhood import (
     MOST_DIMS,
     VARIANCE_KEPT,
+    _scatter,
     exemplar_patches,
     gather_reference,
     site_grid,
@@ -135,6 +136,15 @@ def test_the_space_holds_the_variance_in_orthonormal_directions(kind, size, radi
     assert share >= VARIANCE_KEPT or kept == MOST_DIMS
     variances = ours.points.var(axis=0)[:kept]
     assert (np.diff(variances) <= 1e-5 * variances[0]).all()
+
+
+@pytest.mark.parametrize(("size", "channels", "radius"), [((20, 17), 2, 2), ((5, 9), 1, 1), ((4, 3), 2, 3)])
+def test_the_scatter_is_that_of_the_neighbourhoods(size, channels, radius):
+    """Of odd sizes, and of neighbourhoods wider than the exemplar."""
+    I = field(size, channels=channels)
+    patches = exemplar_patches(I, radius).astype(np.float64)
+    centred = patches - patches.mean(0)
+    np.testing.assert_allclose(_scatter(I, radius), centred.T @ centred, atol=1e-9 * np.prod(size))
 
 
 def test_distances_in_the_space_are_those_of_the_neighbourhoods():

@@ -9,6 +9,7 @@ from synth.motion.neighborhood import Space, site_grid, space, spacing
 from synth.motion.search import (
     QUERIES_TOGETHER,
     Matcher,
+    close_together,
     coherent_reference,
     exact_reference,
     refine_reference,
@@ -41,6 +42,29 @@ def test_exact_equals_its_reference(count, dims):
         expected, squared = exact_reference(points, asked)
         np.testing.assert_array_equal(best, expected)
         np.testing.assert_allclose(distance, squared, rtol=2e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("spread", [0, 1e-3, 0.5])
+def test_nothing_that_a_bound_rules_out_was_the_nearest(spread):
+    """Clusters far apart, in which whole blocks of points are passed over; queries near them and between them."""
+    middles = 20 * cloud(40, 32, seed=1)
+    points = np.repeat(middles, 50, axis=0) + spread * cloud(2000, 32, seed=2)
+    points = points[np.random.default_rng(3).permutation(2000)]
+    asked = np.concatenate([points[::7] + 0.1 * cloud(286, 32, seed=4), middles[1:] / 2 + middles[:-1] / 2])
+    best, distance = exact(points, asked)
+    _, squared = exact_reference(points, asked)
+    np.testing.assert_allclose(distance, squared, rtol=2e-5, atol=2e-2)  # of squares that cancel, 1e4
+    np.testing.assert_allclose(((points[best] - asked) ** 2).sum(1), squared, rtol=2e-5, atol=2e-2)
+
+
+def test_blocks_of_points_lie_close_together_and_identical_ones_in_order():
+    points = np.repeat(cloud(20, 8), 5, axis=0)[np.random.default_rng(0).permutation(100)]
+    order = close_together(points)
+    np.testing.assert_array_equal(np.sort(order), np.arange(100))
+    for point in np.unique(points, axis=0):
+        assert (np.diff(order[(points[order] == point).all(1)]) > 0).all()
+    line = np.arange(96, dtype=np.float32)[np.random.default_rng(1).permutation(96), None]
+    np.testing.assert_array_equal(line[close_together(line)].ravel() // 32, np.arange(96) // 32)
 
 
 def test_every_planted_point_is_found():

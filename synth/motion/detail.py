@@ -76,6 +76,11 @@ class Level:
                                 self.settings.k), Assigner(self.exemplar, width // 2, neighborhood.spacing(width)))
                 for width in self.settings.neighborhoods]
 
+    def prepare(self) -> None:
+        """Make now what is else made when first asked for."""
+        for _, matcher, _ in self.steps:
+            matcher.prepare()
+
     def optimize(self, H: np.ndarray, frame: np.ndarray, iterations: int,
                  coherence: np.ndarray | None = None, boundary: Constraint | None = None) -> tuple[Any, Any]:
         """Search and assign, `iterations` times with each width of neighbourhoods.
@@ -184,11 +189,13 @@ class Synthesis:
         """The coarsest level of the first frame: of several mosaics the one that promises most, optimized."""
         level = self.levels[0]
         rms = np.sqrt(np.mean(level.exemplar**2))
-        trials, boundary = [], self._boundary(0, frame)
-        for start in range(STARTS):  # the device optimizes one while the next is laid
-            random = np.random.Generator(np.random.Philox(key=[self.seed, start]))
-            trials.append(level.optimize(initialize.mosaic(level.exemplar, frame, random), frame, level.settings.few,
-                                         boundary=boundary))
+        boundary = self._boundary(0, frame)
+        randoms = [np.random.Generator(np.random.Philox(key=[self.seed, start])) for start in range(STARTS)]
+        # the device works on one after the other; the host waits for none
+        trials = [level.optimize(mosaic, frame, level.settings.few, boundary=boundary)
+                  for mosaic in initialize.mosaics(level.exemplar, frame, randoms)]
+        for finer in self.levels[1:]:  # meanwhile
+            finer.prepare()
         best, least = None, np.inf
         for optimized, squared in trials:
             H = optimized.get()

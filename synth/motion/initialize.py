@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
+
+from synth import opencl
 
 RELAXATIONS = 15
 # tiles laid per exemplar area: squares that turn do not pack without gaps, and some tiles die out
@@ -20,28 +25,70 @@ def random_pixels(exemplar: np.ndarray, shape: tuple[int, int], random: np.rando
     return pixels[random.integers(len(pixels), size=shape)]
 
 
-def mosaic(exemplar: np.ndarray, frame: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Whole exemplars laid as tiles of a mosaic that follows the frame (Y, X, 2): (Y, X, K).
+def mosaics(exemplar: np.ndarray, frame: np.ndarray, randoms: Sequence[np.random.Generator]) -> list[np.ndarray]:
+    """Whole exemplars laid as tiles of a mosaic that follows the frame (Y, X, 2): (Y, X, K) for each of `randoms`.
 
     The tiles' centres relax as in Hausner 2001 (centroidal Voronoi cells of squares turned with the frame), so
     that each cell of the mosaic is about one exemplar large and a closed motif in its middle stays whole.
     """
     size = exemplar.shape[0]
     rows, columns = frame.shape[:2]
-    cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(np.float32)
+    cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(np.float32)
     count = max(1, round(CROWDING * rows * columns / size**2))
-    centres = random.random((count, 2), dtype=np.float32) * np.array([columns - 1, rows - 1], np.float32)
+    last = np.array([columns - 1, rows - 1], np.float32)
+    centres = np.stack([random.random((count, 2), dtype=np.float32) for random in randoms]) * last
     # to find the middle of a tile, 8 x 8 of its cells are enough
     stride = max(1, size // 8)
-    some = cells.reshape(rows, columns, 2)[::stride, ::stride].reshape(-1, 2)
+    some = np.ascontiguousarray(cells[::stride, ::stride]).reshape(-1, 2)
+    first = count * np.arange(len(centres))[:, None]
     for _ in range(RELAXATIONS):
-        nearest, _ = _owners(some, centres, frame)
-        members = np.bincount(nearest, minlength=count)
-        sums = np.stack([np.bincount(nearest, some[:, i], minlength=count) for i in (0, 1)], axis=-1)
-        centres = np.where(members[:, None] > 0, sums / np.maximum(members, 1)[:, None], centres).astype(np.float32)
-    _, offset = _owners(cells, centres, frame)
+        tile = (owners(some, centres, frame, size)[0] + first).ravel()
+        members = np.bincount(tile, minlength=centres.size // 2)
+        sums = np.stack([np.bincount(tile, np.tile(some[:, i], len(centres)), minlength=len(members))
+                         for i in (0, 1)], axis=-1)
+        middles = (sums / np.maximum(members, 1)[:, None]).astype(np.float32).reshape(centres.shape)
+        centres = np.where(members.reshape(-1, count, 1) > 0, middles, centres)
+    offset = owners(cells.reshape(-1, 2), centres, frame, size)[1]
     at = np.rint(offset + (size - 1) / 2).astype(int) % size
-    return exemplar[at[:, 1], at[:, 0]].reshape(rows, columns, -1)
+    return list(exemplar[at[..., 1], at[..., 0]].reshape(-1, rows, columns, exemplar.shape[-1]))
+
+
+def owners_reference(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Specification of `owners`; arguments as there."""
+    e = _axes(centres, frame)[:, None]
+    way = cells[:, None] - centres[:, None]
+    offset = np.stack([np.sum(e * way, -1), e[..., 0] * way[..., 1] - e[..., 1] * way[..., 0]], axis=-1)
+    owner = np.abs(offset).max(axis=-1).argmin(axis=-1)
+    return owner, np.take_along_axis(offset, owner[..., None, None], axis=2)[:, :, 0]
+
+
+def owners(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray, edge: float) -> tuple[np.ndarray, np.ndarray]:
+    """The centre whose turned square holds a cell best, and the cell's offset in that square's frame.
+
+    cells (P, 2), centres (S, N, 2) of S mosaics, float32 as x, y inside frame (Y, X, 2); `edge`, about the distance
+    of the centres, bears on speed alone. Returns (S, P) int32 and (S, P, 2) float32.
+    """
+    program = opencl.program(Path(__file__).with_suffix(".cl"))
+    many, count = centres.shape[:2]
+    grid = np.array([-(-frame.shape[1] // edge), -(-frame.shape[0] // edge)], np.int32)
+    at = np.clip((centres / np.float32(edge)).astype(int), 0, grid - 1)
+    bucket = at[..., 1] * grid[0] + at[..., 0]
+    order = np.argsort(bucket, axis=1, kind="stable")
+    every = np.arange(grid.prod() + 1)
+    starts = np.stack([np.searchsorted(row, every) for row in np.take_along_axis(bucket, order, 1)])
+    sorted_centres, sorted_axes = (np.take_along_axis(values, order[..., None], 1)
+                                   for values in (centres, _axes(centres, frame)))
+    owner, offset = opencl.empty((many, len(cells)), np.int32), opencl.empty((many, len(cells), 2))
+    program.owners((len(cells), many), None, *map(opencl.to_device, (
+        cells, sorted_centres, sorted_axes, order.astype(np.int32), starts.astype(np.int32))),
+        np.int32(count), grid, np.float32(edge), owner, offset)
+    return owner.get(), offset.get()
+
+
+def _axes(centres: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """The local x axis at centres (S, N, 2)."""
+    at = np.rint(centres).astype(int)
+    return frame[np.clip(at[..., 1], 0, frame.shape[0] - 1), np.clip(at[..., 0], 0, frame.shape[1] - 1)]
 
 
 def reseed(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray:
@@ -75,25 +122,11 @@ def reseed(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray
     return H
 
 
-def _owners(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For each of cells (P, 2) the centre whose turned square holds it best, and the offset in that square's frame."""
-    _, index = cKDTree(centres).query(cells, k=min(NEAREST, len(centres)))
-    index = index.reshape(len(cells), -1)
-    at = np.rint(centres).astype(int)
-    e = frame[np.clip(at[:, 1], 0, frame.shape[0] - 1), np.clip(at[:, 0], 0, frame.shape[1] - 1)]
-    e_x, e_y = e[:, 0][index], e[:, 1][index]
-    way_x, way_y = (cells[:, i, None] - centres[:, i][index] for i in (0, 1))
-    x, y = e_x * way_x + e_y * way_y, e_x * way_y - e_y * way_x
-    nearest = np.maximum(np.abs(x), np.abs(y)).argmin(axis=1)
-    rows = np.arange(len(cells))
-    return index[rows, nearest], np.stack([x[rows, nearest], y[rows, nearest]], axis=-1)
-
-
 def blocks(frame: np.ndarray, edge: int, random: np.random.Generator) -> np.ndarray:
     """The mosaic in three dimensions: cubes of `edge` cells turned with the frame (Z, Y, X, 3, 3) fill the domain.
 
     Returns for each cell its offset from the middle of the cube that holds it, in that cube's local frame:
-    (Z, Y, X, 3) float32. The cubes' centres relax as in `mosaic`.
+    (Z, Y, X, 3) float32. The cubes' centres relax as in `mosaics`.
     """
     shape = frame.shape[:3]
     # x, y, z

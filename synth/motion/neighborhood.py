@@ -7,6 +7,7 @@ of the exemplar's own neighbourhoods, where its best match is searched (ma09 §3
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from synth import opencl
 
@@ -128,23 +129,47 @@ class Space:
         return ((patches - self.mean) @ self.basis).astype(np.float32)
 
 
+@functools.cache  # it searches the process's libraries
+def _blas() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
 def space(exemplar: np.ndarray, radius: int) -> Space:
     """Principal components of the toroidal neighbourhoods of exemplar (N, M, K), ordered by variance."""
-    return space_of(exemplar_patches(exemplar, radius), radius)
+    return space_of(exemplar_patches(exemplar, radius), radius, _scatter(exemplar, radius))
 
 
-def space_of(patches: np.ndarray, radius: int) -> Space:
+def _scatter(exemplar: np.ndarray, radius: int) -> np.ndarray:
+    """X^T X of all toroidal neighbourhoods, their mean taken away, (C, C): from the exemplar's autocorrelation.
+
+    Two numbers of a neighbourhood at offsets i and j, summed over the whole torus, depend on j - i alone.
+    """
+    rows, columns, channels = exemplar.shape
+    spectrum = np.fft.rfft2(exemplar - exemplar.mean(axis=(0, 1), dtype=np.float64), axes=(0, 1))
+    correlation = np.fft.irfft2(spectrum.conj()[..., :, None] * spectrum[..., None, :], (rows, columns), axes=(0, 1))
+    span = np.arange(2 * radius + 1)
+    way = span - span[:, None]
+    pairs = correlation[(way % rows)[:, None, :, None], (way % columns)[None, :, None, :]]  # iy, ix, jy, jx, k, l
+    length = len(span) ** 2 * channels
+    return np.ascontiguousarray(pairs.transpose(0, 1, 4, 2, 3, 5)).reshape(length, length)
+
+
+def space_of(patches: np.ndarray, radius: int, scatter: np.ndarray | None = None) -> Space:
     """Principal components of neighbourhoods (E, C) of a radius, ordered by variance.
 
-    Keeps as many as hold 99.5 % of the variance, 64 at most. One thread of BLAS: its sums, and with them
-    the basis, would otherwise depend on the number of threads.
+    Keeps as many as hold 99.5 % of the variance, 64 at most; scatter (C, C), X^T X of them without their mean, where
+    it is known. One thread of BLAS: its sums, and with them the basis, would otherwise depend on the number of
+    threads.
     """
-    mean = patches.mean(axis=0, dtype=np.float64)
+    mean = patches.mean(axis=0, dtype=np.float64).astype(np.float32)
     centred = patches - mean
-    with threadpool_limits(1):
+    with _blas().limit(limits=1):
         # the smaller of the two Gram matrices has the same spectrum
         tall = len(centred) >= centred.shape[1]
-        gram = centred.T @ centred if tall else centred @ centred.T
+        if tall:
+            gram = centred.T.astype(np.float64) @ centred if scatter is None else scatter
+        else:
+            gram = centred.astype(np.float64) @ centred.T
         most = min(MOST_DIMS, len(gram))
         values, vectors = eigh(gram, subset_by_index=(len(gram) - most, len(gram) - 1))
         values, vectors = np.maximum(values[::-1], 0), vectors[:, ::-1]
@@ -152,10 +177,10 @@ def space_of(patches: np.ndarray, radius: int) -> Space:
         kept = min(most, int(np.searchsorted(share, VARIANCE_KEPT)) + 1)
         vectors = vectors[:, :kept]
         if not tall:
-            vectors = centred.T @ vectors
+            vectors = centred.T.astype(np.float64) @ vectors
             vectors /= np.maximum(np.linalg.norm(vectors, axis=0), np.finfo(float).tiny)
         dims = -(-kept // 16) * 16
         basis = np.zeros((patches.shape[1], dims), np.float32)
         basis[:, :kept] = vectors
-        points = (centred @ basis.astype(np.float64)).astype(np.float32)
-    return Space(radius, mean.astype(np.float32), basis, points)
+        points = centred @ basis
+    return Space(radius, mean, basis, points)

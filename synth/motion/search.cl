@@ -1,21 +1,74 @@
 // Best matches in PCA space (ma09 §3.1 exact, §3.7 k-coherence).
 // -D DIMS   dimensions of the space, a multiple of 16
-// -D BLOCK  queries a work-item treats together
+// -D BLOCK  queries a work-item treats together, 16 at most
+// -D BOX    dimensions in which a block of points has a box
 // -D CANDIDATES  similar neighbourhoods each match suggests
 // -D DAMPING  of the sub-cell step, as a share of its matrix's trace
 
 #define HUGE_DISTANCE 3.0e38f
 
-// Brute force: sixteen exemplar points to a vector lane, BLOCK queries to a work-item, so that every load of
-// the exemplar serves BLOCK fused multiply-adds. With half = |e|^2 / 2, |q - e|^2 = |q|^2 + 2 (half - q.e).
-// The loops over BLOCK are unrolled, or the compiler keeps the sums in memory.
-// points (blocks, DIMS, 32): 32 points side by side; half (blocks, 32), huge in the padding; queries (count, DIMS)
-__kernel void exact(__global const float *points, __global const float *half_norm, int blocks,
-                    __global const float *queries, int count, __global int *best, __global float *distance) {
+// How far sixteen queries, one to a lane, lie from a box at least: squared, in the first BOX dimensions.
+inline float16 outside(__global const float *box, const float16 *lanes) {
+    float16 sum = (float16)(0.0f);
+    for (int d = 0; d < BOX; d++) {
+        const float16 away = max(max(box[d] - lanes[d], lanes[d] - box[BOX + d]), (float16)(0.0f));
+        sum = fma(away, away, sum);
+    }
+    return sum;
+}
+
+// All blocks of 32 points that may hold a nearest one, sixteen points to a vector lane, BLOCK queries to a work-item,
+// so that every load of the exemplar serves BLOCK fused multiply-adds. With half = |e|^2 / 2,
+// |q - e|^2 = |q|^2 + 2 (half - q.e). A block is passed over where its box lies farther from each of the queries than
+// what the block with the nearest box holds. The loops over BLOCK are unrolled, or the compiler keeps the sums in
+// memory.
+// points (blocks, DIMS, 32): 32 points side by side; half (blocks, 32), huge in the padding; index (blocks, 32) of
+// each point; boxes (blocks, 2, BOX), least and greatest; queries (count, DIMS)
+__kernel void exact(__global const float *points, __global const float *half_norm, __global const int *index,
+                    __global const float *boxes, int blocks, __global const float *queries, int count,
+                    __global int *best, __global float *distance) {
     const int first = get_global_id(0) * BLOCK;
-    float q[DIMS][BLOCK];
-    for (int b = 0; b < BLOCK; b++)
-        for (int d = 0; d < DIMS; d++) q[d][b] = -queries[min(first + b, count - 1) * DIMS + d];
+    float q[DIMS][BLOCK], norm[16], bound[16];
+    float16 lanes[BOX];
+    int nearest[16];
+    for (int b = 0; b < BLOCK; b++) {
+        __global const float *query = queries + min(first + b, count - 1) * DIMS;
+        norm[b] = 0.0f;
+        for (int d = 0; d < DIMS; d++) {
+            q[d][b] = -query[d];
+            norm[b] = fma(query[d], query[d], norm[b]);
+        }
+    }
+    for (int d = 0; d < BOX; d++) {
+        float lane[16];
+        for (int b = 0; b < 16; b++) lane[b] = -q[d][min(b, BLOCK - 1)];
+        lanes[d] = vload16(0, lane);
+    }
+    float16 closest = (float16)(HUGE_DISTANCE);
+    int16 block = (int16)(0);
+    for (int e = 0; e < blocks; e++) {
+        const float16 away = outside(boxes + e * 2 * BOX, lanes);
+        block = select(block, (int16)(e), away < closest);
+        closest = min(closest, away);
+    }
+    vstore16(block, 0, nearest);
+    for (int b = 0; b < BLOCK; b++) {
+        const int e = nearest[b] * 32;
+        float16 left = vload16(0, half_norm + e), right = vload16(0, half_norm + e + 16);
+        for (int d = 0; d < DIMS; d++) {
+            left = fma((float16)(q[d][b]), vload16(0, points + e * DIMS + d * 32), left);
+            right = fma((float16)(q[d][b]), vload16(0, points + e * DIMS + d * 32 + 16), right);
+        }
+        float values[16], value = HUGE_DISTANCE;
+        vstore16(min(left, right), 0, values);
+        for (int lane = 0; lane < 16; lane++) value = min(value, values[lane]);
+        const float squared = norm[b] + 2.0f * value;
+        // more than rounding can take away
+        bound[b] = squared + 2e-5f * (norm[b] + fabs(squared));
+    }
+    for (int b = BLOCK; b < 16; b++) bound[b] = bound[BLOCK - 1];
+    const float16 reach = vload16(0, bound);
+
     float16 least[BLOCK];
     int16 where[BLOCK];
 #pragma unroll
@@ -24,6 +77,7 @@ __kernel void exact(__global const float *points, __global const float *half_nor
         where[b] = (int16)(0);
     }
     for (int e = 0; e < blocks * 32; e += 32) {
+        if (!any(outside(boxes + e / 32 * 2 * BOX, lanes) <= reach)) continue;
         float16 left[BLOCK], right[BLOCK];
 #pragma unroll
         for (int b = 0; b < BLOCK; b++) {
@@ -52,23 +106,22 @@ __kernel void exact(__global const float *points, __global const float *half_nor
 #pragma unroll
     for (int b = 0; b < BLOCK; b++) {
         if (first + b >= count) continue;
-        float lanes[16];
+        float values[16];
         int starts[16];
-        vstore16(least[b], 0, lanes);
+        vstore16(least[b], 0, values);
         vstore16(where[b], 0, starts);
-        float value = lanes[0], norm = 0.0f;
-        int index = starts[0];
+        float value = values[0];
+        int found = index[starts[0]];
         // equal distances go to the lowest index, whatever lane they were seen in
         for (int lane = 1; lane < 16; lane++) {
-            const int at = starts[lane] + lane;
-            if (lanes[lane] < value || (lanes[lane] == value && at < index)) {
-                value = lanes[lane];
-                index = at;
+            const int at = index[starts[lane] + lane];
+            if (values[lane] < value || (values[lane] == value && at < found)) {
+                value = values[lane];
+                found = at;
             }
         }
-        for (int d = 0; d < DIMS; d++) norm = fma(q[d][b], q[d][b], norm);
-        best[first + b] = index;
-        distance[first + b] = max(0.0f, norm + 2.0f * value);
+        best[first + b] = found;
+        distance[first + b] = max(0.0f, norm[b] + 2.0f * value);
     }
 }
 

@@ -1,6 +1,6 @@
 """Search (ma09 §3.1 and §3.7): the best match of each output neighbourhood among the exemplar's own.
 
-Exact search compares with all of them; k-coherence only with what the neighbouring sites suggest.
+Exact search compares with all that a bound cannot rule out; k-coherence only with what the neighbouring sites suggest.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ from synth import opencl
 from synth.motion.neighborhood import Space
 
 QUERIES_TOGETHER = 12
+POINTS_TOGETHER = 32
+# dimensions in which a block of points has a box: the first, which vary most
+BOX = 8
 # of the sub-cell step, as a share of its matrix's trace
 DAMPING = 1e-3
 
@@ -80,23 +83,26 @@ class Matcher:
     @cached_property
     def _program(self) -> Any:
         return opencl.program(Path(__file__).with_suffix(".cl"), DIMS=self.space.dims, BLOCK=QUERIES_TOGETHER,
-                              CANDIDATES=self.candidates, DAMPING=f"{DAMPING}f")
+                              CANDIDATES=self.candidates, BOX=BOX, DAMPING=f"{DAMPING}f")
 
     @cached_property
     def points(self) -> Any:
         return opencl.to_device(self.space.points)
 
     @cached_property
-    def _blocks(self) -> tuple[Any, Any, np.int32]:
-        """The points 32 side by side: (blocks, D, 32), half their squared norms (blocks, 32), how many blocks."""
-        count = len(self.space.points)
-        blocks = -(-count // 32)
-        points = np.zeros((blocks * 32, self.space.dims), np.float32)
-        points[:count] = self.space.points
-        half = np.full(blocks * 32, 1e30, np.float32)
-        half[:count] = 0.5 * (self.space.points.astype(np.float64) ** 2).sum(1)
-        side_by_side = points.reshape(blocks, 32, -1).transpose(0, 2, 1)
-        return opencl.to_device(side_by_side), opencl.to_device(half), np.int32(blocks)
+    def _blocks(self) -> tuple[Any, Any, Any, Any, np.int32]:
+        """The points in blocks of 32 that lie close together, side by side: (blocks, D, 32); half their squared norms
+        and their indices (blocks, 32); the blocks' boxes (blocks, 2, BOX); how many blocks."""
+        order = close_together(self.space.points[:, :BOX])
+        blocks = -(-len(order) // POINTS_TOGETHER)
+        filled = np.concatenate([order, np.full(blocks * POINTS_TOGETHER - len(order), order[-1])])
+        points = self.space.points[filled]
+        half = 0.5 * (points.astype(np.float64) ** 2).sum(1)
+        half[len(order):] = 1e30
+        side_by_side = points.reshape(blocks, POINTS_TOGETHER, -1).transpose(0, 2, 1)
+        boxes = np.stack([side_by_side[:, :BOX].min(2), side_by_side[:, :BOX].max(2)], axis=1)
+        return (opencl.to_device(side_by_side), opencl.to_device(half.astype(np.float32)),
+                opencl.to_device(filled.astype(np.int32)), opencl.to_device(boxes), np.int32(blocks))
 
     @cached_property
     def similar(self) -> Any:
@@ -105,6 +111,10 @@ class Matcher:
     @property
     def _size(self) -> np.ndarray:
         return np.array(self.exemplar[::-1], np.int32)
+
+    def prepare(self) -> None:
+        """Bring to the device now what `exact` else brings when first called."""
+        _ = self._blocks
 
     def exact(self, queries: Any) -> tuple[Any, Any]:
         """Nearest neighbourhoods to device queries (S, D): device (S,) int32 index, (S,) float32 squared distance."""
@@ -127,6 +137,23 @@ class Matcher:
         position = opencl.empty((queries.shape[0], 2))
         self._program.refine((queries.shape[0],), None, self.points, self._size, queries, best, position)
         return position
+
+
+def close_together(points: np.ndarray) -> np.ndarray:
+    """An order of points (E, D) in which each block of POINTS_TOGETHER is a leaf of a k-d tree: (E,) indices.
+
+    Split at the middle of the widest dimension; identical points stay in order of index.
+    """
+    def split(index: np.ndarray) -> list[np.ndarray]:
+        if len(index) <= POINTS_TOGETHER:
+            return [index]
+        inside = points[index]
+        widest = inside[:, np.ptp(inside, axis=0).argmax()]
+        index = index[np.argsort(widest, kind="stable")]
+        middle = -(-len(index) // (2 * POINTS_TOGETHER)) * POINTS_TOGETHER
+        return split(index[:middle]) + split(index[middle:])
+
+    return np.concatenate(split(np.arange(len(points))))
 
 
 def similar_sets(points: np.ndarray, k: int) -> np.ndarray:
