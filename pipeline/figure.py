@@ -13,6 +13,7 @@ import numpy as np
 
 from pipeline import manifest, panels, sources
 from pipeline.files import pictures, video
+from pipeline.product import Product
 from pipeline.progress import Progress
 from pipeline.schema import Scene, is_of_exemplar
 
@@ -35,11 +36,11 @@ def make(works: Works, progress: Progress) -> None:
     still = scenes[0].figure.frame or last
     folder = manifest.Folder(works.root)
     png, mp4 = f"{works.scenes.name}.png", f"{works.scenes.name}.mp4"
-    keys = {png: _key(works, [still])}
+    keys = {png: _key(works, [still], still=True)}
     if scenes[0].figure.animation:
         keys[mp4] = _key(works, range(1, last + 1))
     if not folder.whole(png, keys[png]):
-        pictures.write(works.root / png, sheet(works, still))
+        pictures.write(works.root / png, sheet(works, still, still=True))
         folder.add(png, keys[png])
     if mp4 in keys and not folder.whole(mp4, keys[mp4]):
         with progress.task("figure", last) as advance:
@@ -54,12 +55,12 @@ def make(works: Works, progress: Progress) -> None:
     folder.close(keys, {"scene": works.scenes.name, "stage": "figure"})
 
 
-def _key(works: Works, frames: Any) -> str:
+def _key(works: Works, frames: Any, still: bool = False) -> str:
     """What a figure of these frames depends on."""
     shown = [works.scenes.variants[variant].figure.model_dump() for variant in works.scenes.variants]
     hashes = []
     for variant, panel in _places(works):
-        product = works.products[variant][panel.picture]
+        product = _product(works, variant, panel, still)
         for frame in dict.fromkeys(_frame(product.animated, works.scenes.variants[variant], f) for f in frames):
             entry = works.require(variant, product.name, frame)
             hashes.append(entry.sha256)
@@ -79,8 +80,14 @@ def _places(works: Works) -> list[tuple[str, panels.Shown]]:
     return [(variant, panel) for variant, scene in works.scenes.variants.items() for panel in panels.shown(scene)]
 
 
-def sheet(works: Works, frame: int) -> np.ndarray:
-    """The figure at a frame, (h, w, 3) uint8 sRGB."""
+def _product(works: Works, variant: str, panel: panels.Shown, still: bool) -> Product:
+    """The product that a panel shows, in the animation or in the still."""
+    made = works.products[variant]
+    return made["still"] if still and panel.panel == "result" and "still" in made else made[panel.picture]
+
+
+def sheet(works: Works, frame: int, still: bool = False) -> np.ndarray:
+    """The figure at a frame, (h, w, 3) uint8 sRGB: as the animation shows it, or as the still does."""
     from render import layout
 
     scenes = works.scenes.variants
@@ -91,7 +98,7 @@ def sheet(works: Works, frame: int) -> np.ndarray:
         label = _label(scenes[variant], panel)
         if several:
             label = variant if panel == panels.shown(scenes[variant])[0] else label
-        shown.append(_panel(works, variant, panel, frame, label))
+        shown.append(_panel(works, variant, panel, frame, still, label))
     if several and len(panels.shown(first)) > 1:
         columns = len(panels.shown(first))
     else:
@@ -107,11 +114,11 @@ def _label(scene: Scene, panel: panels.Shown) -> str:
     return LABELS[panel.panel] + (f", {panel.view}" if panel.view else "")
 
 
-def _panel(works: Works, variant: str, panel: panels.Shown, frame: int, label: str) -> Any:
+def _panel(works: Works, variant: str, panel: panels.Shown, frame: int, still: bool, label: str) -> Any:
     from render import film, layout, lic
 
     scene = works.scenes.variants[variant]
-    product = works.products[variant][panel.picture]
+    product = _product(works, variant, panel, still)
     file = works.file(variant, product.name, _frame(product.animated, scene, frame))
     light = product.read(file, scene)
     filmic = panel.panel == "result" and scene.render.kind != "ink"

@@ -39,6 +39,21 @@ def read_light(file: Path, scene: Scene) -> np.ndarray:
 
 def make_beauty(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The smoke: lit, ink or a volume."""
+    method = "march" if has_still(scene) else getattr(scene.render, "method", "")
+    yield from _smoke_pictures(scene, stock, frames, method)
+
+
+def make_still(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The volume that the still shows, where the animation's are marched through."""
+    yield from _smoke_pictures(scene, stock, frames, "path")
+
+
+def has_still(scene: Scene) -> bool:
+    """Whether the still has a picture of its own, path-traced, and the animation marched ones."""
+    return scene.render.kind == "volume" and scene.render.method == "both" and scene.figure.animation
+
+
+def _smoke_pictures(scene: Scene, stock: Stock, frames: list[int], method: str) -> Iterator[tuple[int, np.ndarray]]:
     from render import smoke
 
     settings: Any = scene.render
@@ -53,7 +68,8 @@ def make_beauty(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
                 yield frame, smoke.volume(
                     density.values, density.voxel_size, density.origin, smoke.VolumeSettings(
                         width=settings.width, height=settings.height, spp=settings.spp, seed=scene.seed,
-                        denoised=settings.denoised, extinction=settings.extinction, bowl=settings.bowl))
+                        extinction=settings.extinction, bowl=settings.bowl,
+                        method="march" if method == "march" else "path", denoised=settings.denoised))
 
 
 def make_seaweed(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
@@ -209,7 +225,10 @@ def with_arrows(picture: np.ndarray, right: np.ndarray, wrong: np.ndarray | None
 
 def products(scene: Scene) -> tuple[Product, ...]:
     """The pictures that the scene's figure shows, and the smoke, the particles or the seaweed."""
-    made = {"none": [], "seaweed": [_seaweed()], "particles": _river(scene)}.get(scene.render.kind, [_smoke()])
+    others = {"none": [], "seaweed": [_seaweed()], "particles": _river(scene)}
+    made = others.get(scene.render.kind, [_smoke("beauty", make_beauty)])
+    if has_still(scene):
+        made.append(_smoke("still", make_still))
     for panel in dict.fromkeys(shown(scene)):
         if panel.panel == "result":
             continue
@@ -237,11 +256,11 @@ def products(scene: Scene) -> tuple[Product, ...]:
     return tuple(made)
 
 
-def _smoke() -> Product:
+def _smoke(name: str, make: Any) -> Product:
     return Product(
-        name="beauty", stage="render", folder="images", suffix=suffix, reads=("render", "seed"),
-        inputs=(("density", "same"),), methods=("render.smoke",), make=make_beauty, write=write_light,
-        read=read_light)
+        name=name, stage="render", folder="images", suffix=suffix, reads=("render", "seed"),
+        inputs=(("density", "same"),), methods=("render.smoke",), make=make, write=write_light, read=read_light,
+        still=name == "still")
 
 
 def _river(scene: Scene) -> list[Product]:

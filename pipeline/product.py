@@ -40,6 +40,7 @@ class Product:
             i, or the one file there is ("once")
     make    make(scene, stock, frames): yields (frame, value) for each of `frames` (ascending), in that order
     write   write(file, value, scene); `read` is its inverse
+    still   of an animated product: whether there is only the frame that the still shows
     """
 
     name: str
@@ -53,6 +54,7 @@ class Product:
     write: Callable[[Path, Any, Scene], None]
     read: Callable[[Path, Scene], Any]
     animated: bool = True
+    still: bool = False
 
     def file(self, scene: Scene, frame: int) -> str:
         """File name of a frame."""
@@ -63,7 +65,7 @@ class Product:
         """The frames there are: 1 to scene.frames; the still's alone where there is no animation; or [0]."""
         if not self.animated:
             return [0]
-        if self.stage != "synth" and not scene.figure.animation:
+        if self.still or (self.stage != "synth" and not scene.figure.animation):
             return [scene.figure.frame or scene.frames]
         return list(range(1, scene.frames + 1))
 

@@ -382,11 +382,14 @@ class InkRender(Table):
 
 
 class VolumeRender(Table):
-    """A volume path-traced by Mitsuba."""
+    """A volume, path-traced by Mitsuba or marched through by OpenCL. A march takes seconds, has no noise and does not
+    flicker; it is an approximation."""
 
     kind: Literal["volume"] = key("a volume in a studio")
     width: int = key("of the picture", 512, "pixels", ge=16, le=LARGEST)
     height: int = key("of the picture", 640, "pixels", ge=16, le=LARGEST)
+    method: Literal["path", "march", "both"] = key(
+        "path-traced, marched, or both: the still path-traced, the animation marched", "path")
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
     denoised: bool = key("fit the paths to guides without noise", True)
     extinction: float = key("of smoke of density 1", 110.0, "per height", gt=0, le=10000)

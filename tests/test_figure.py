@@ -119,3 +119,20 @@ def test_an_exemplar_is_no_higher_than_a_result_that_is_wider_than_high() -> Non
     assert (width("exemplar", **wide), width("coarse", **wide), width("result", **wide)) == (180, 320, 320)
     assert width("exemplar", width=512, height=640) == 320
     assert width("exemplar", width=512) == 320
+
+
+def test_a_still_of_its_own_stands_in_the_png_and_not_in_the_animation(tmp_path: Path, laid: list,
+                                                                       monkeypatch: pytest.MonkeyPatch) -> None:
+    from render import smoke
+
+    def drawn(density: np.ndarray, voxel: float, origin: object, settings: smoke.VolumeSettings) -> np.ndarray:
+        return np.full((16, 16, 3), {"path": 0.0, "march": 1.0}[settings.method], np.float32)
+
+    monkeypatch.setattr(smoke, "volume", drawn)
+    file = tmp_path / "tiny.toml"
+    solid = SCENE.replace("[8, 8]", "[8, 8, 8]").replace('kind = "none"', 'kind = "volume"\nmethod = "both"')
+    file.write_text(f'{solid}panels = ["result"]\nframe = 1\n')
+    stages.run("figure", load(file), tmp_path / "out", Progress(quiet=True))
+    assert [rows[0][0].picture.mean() < 0.5 for rows in laid] == [True, False, False]
+    assert sorted(p.name for p in (tmp_path / "out" / "tiny" / "images").glob("*.exr")) == [
+        "beauty.0001.exr", "beauty.0002.exr", "still.0001.exr"]

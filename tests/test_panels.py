@@ -140,3 +140,26 @@ def test_arrows_of_the_detail_are_red_where_right_and_green_where_not_transforme
     for colour in (arrows.RED, arrows.GREEN):
         near = np.abs(drawn - film.decoded(np.array(colour))).max(-1) < 0.05
         assert (near & touched).sum() > 10
+
+
+def test_the_method_of_a_volume_is_the_scenes_and_a_still_may_have_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    from render import smoke
+
+    def drawn(density: np.ndarray, voxel: float, origin: Any, settings: smoke.VolumeSettings) -> np.ndarray:
+        return np.full((2, 2, 3), {"path": 1.0, "march": 2.0}[settings.method])
+
+    monkeypatch.setattr(smoke, "volume", drawn)
+
+    def methods(method: str, **figure: Any) -> dict[str, tuple[float, list[int]]]:
+        made = scene(["result"], **{**SPACE, "render": {**SPACE["render"], "method": method}}, frames=3,
+                     figure={"panels": ["result"], "frame": 2, **figure})
+        shown = {}
+        for product in panels.products(made):
+            (_, light), = product.make(made, Solid(), [2])
+            shown[product.name] = (light[0, 0, 0], product.frames(made))
+        return shown
+
+    assert methods("path") == {"beauty": (1.0, [1, 2, 3])}
+    assert methods("march") == {"beauty": (2.0, [1, 2, 3])}
+    assert methods("both") == {"beauty": (2.0, [1, 2, 3]), "still": (1.0, [2])}
+    assert methods("both", animation=False) == {"beauty": (1.0, [2])}
