@@ -65,7 +65,9 @@ class Works:
         path = self.root / product.folder
         if len(makers) > 1:
             path /= folder_name(next(v for v in makers if self.plan(v, name) == self.plan(variant, name)))
-        return self._folders.setdefault(path, Folder(path))
+        if path not in self._folders:  # opening one reads all its entries
+            self._folders[path] = Folder(path)
+        return self._folders[path]
 
     def file(self, variant: str, name: str, frame: int) -> Path:
         """Where a frame of a product is, or will be."""

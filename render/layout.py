@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy import sparse
 
 from render import film
 
@@ -65,12 +66,15 @@ def fitted(picture: np.ndarray, width: int) -> np.ndarray:
 def _averaged_rows(values: np.ndarray, count: int) -> np.ndarray:
     """`values` (n, ...) as `count` rows, each the exact mean of the rows and parts of rows it covers."""
     n = len(values)
-    sums = np.pad(np.cumsum(values, axis=0, dtype=np.float64), ((1, 0), *((0, 0),) * (values.ndim - 1)))
     edges = np.arange(count + 1) * (n / count)
-    low = np.minimum(edges.astype(int), n - 1)
-    share = (edges - low).reshape(-1, *[1] * (values.ndim - 1))
-    at_edges = sums[low] * (1.0 - share) + sums[low + 1] * share
-    return np.diff(at_edges, axis=0) * (count / n)
+    covered = edges[:-1].astype(int)[:, None] + np.arange(int(np.ceil(n / count)) + 1)
+    share = np.minimum(edges[1:, None], covered + 1) - np.maximum(edges[:-1, None], covered)
+    row = np.broadcast_to(np.arange(count)[:, None], covered.shape)
+    inside = (share > 0) & (covered < n)
+    weights = sparse.csr_matrix(((share[inside] * (count / n)).astype(np.float32), (row[inside], covered[inside])),
+                                (count, n))
+    averages = weights @ values.reshape(n, -1)
+    return np.asarray(averages.reshape(count, *values.shape[1:]))
 
 
 @functools.cache
