@@ -25,7 +25,7 @@ from synth.motion import initialize, neighborhood
 from synth.motion.assignment import robust_weights
 from synth.motion.detail import COHERENCE, DEFORMED
 from synth.motion.frames import solid_frame
-from synth.motion.search import DAMPING, QUERIES_TOGETHER, Matcher
+from synth.motion.search import BOX, DAMPING, QUERIES_TOGETHER, Matcher
 
 # each level is synthesized on the domain grown by the radius of a neighbourhood, as in the plane
 MARGIN = 4
@@ -171,7 +171,7 @@ class Eye:
         step = neighborhood.spacing(self.width)
         return {"VOLUME": self.view.dimension - 2, "RADIUS": self.width // 2, "FOOT": self.width // 2, "SPACING": step,
                 "FIRST": step // 2, "BORDER": self._border, "DIMS": self.matcher.space.dims,
-                "BLOCK": QUERIES_TOGETHER, "CANDIDATES": self.settings.k, "DAMPING": f"{DAMPING}f"}
+                "BLOCK": QUERIES_TOGETHER, "BOX": BOX, "CANDIDATES": self.settings.k, "DAMPING": f"{DAMPING}f"}
 
     def _program(self, eight: bool) -> Any:
         return opencl.program(Path(__file__).with_suffix(".cl"), SEEN=int(eight), **self._defines)
