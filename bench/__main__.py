@@ -1,4 +1,4 @@
-"""`python -m bench [synthesis] [search] [density] [repeat] [quality]`: measure, print tables, write out/bench.json."""
+"""`python -m bench [part …]`, the parts below, all without: measure, print tables, write out/bench.json."""
 
 from __future__ import annotations
 
@@ -64,8 +64,26 @@ def repeat_rows(found: dict[str, Any]) -> Iterable[Row]:
            verdict(different == 1), "not said")
 
 
+def potential_rows(found: dict[str, Any]) -> Iterable[Row]:
+    rows = found["motion and potential"]
+    largest = {way: max(row["divergence"] for row in rows if row["synthesized"] == way)
+               for way in ("motion", "potential")}
+    yield ("2-D potential synthesis, divergence over the rms gradient", f"{largest['potential']:.1e}", "1e-4",
+           verdict(largest["potential"] <= 1e-4), f"the motion synthesized: {largest['motion']:.2g}")
+
+
+def lagrangian_rows(found: dict[str, Any]) -> Iterable[Row]:
+    mean = {way: sum(row["change in 4 frames"] for row in found["flicker"] if row["samples"] == way) / 3
+            for way in ("grid", "lagrangian")}
+    yield ("Lagrangian samples, change in 4 frames of a constant flow", f"{mean['lagrangian']:.1%} of the rms",
+           f"{mean['grid']:.1%}", verdict(mean["lagrangian"] <= mean["grid"]), "the reach: on the grid")
+
+
 ROWS: dict[str, Callable[[dict[str, Any]], Iterable[Row]]] = {
-    "synthesis": synthesis_rows, "search": search_rows, "density": density_rows, "repeat": repeat_rows}
+    "synthesis": synthesis_rows, "search": search_rows, "density": density_rows, "repeat": repeat_rows,
+    "potential": potential_rows, "lagrangian": lagrangian_rows}
+TABLES = ("quality", "potential", "lagrangian")  # lists of equal rows each: printed as tables of their own
+PARTS = tuple(dict.fromkeys((*ROWS, *TABLES)))
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
@@ -78,9 +96,9 @@ def table(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 
 def main() -> None:
     options = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
-    options.add_argument("parts", nargs="*", metavar="part", help=f"{', '.join([*ROWS, 'quality'])}; all without")
-    chosen = options.parse_args().parts or [*ROWS, "quality"]
-    if unknown := set(chosen) - {*ROWS, "quality"}:
+    options.add_argument("parts", nargs="*", metavar="part", help=f"{', '.join(PARTS)}; all without")
+    chosen = options.parse_args().parts or PARTS
+    if unknown := set(chosen) - {*PARTS}:
         options.error(f"no part is called {', '.join(sorted(unknown))}")
     found: dict[str, Any] = {"machine": machine()}
     print("\n".join(f"{key}: {value}" for key, value in found["machine"].items()), flush=True)
@@ -91,8 +109,8 @@ def main() -> None:
         rows += ROWS[part](found[part]) if part in ROWS else []
     if rows:
         print(f"\n{table(HEADER, rows)}")
-    if "quality" in found:
-        for name, lines in found["quality"].items():
+    for part in (part for part in TABLES if part in found):
+        for name, lines in found[part].items():
             print(f"\n{name}\n{table(list(lines[0]), (list(line.values()) for line in lines))}")
     written = Path("out/bench.json")
     written.parent.mkdir(exist_ok=True)

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 LABELS = {
     "input": "input", "exemplar": "exemplar *I*", "exemplar-colour": "exemplar *I*", "exemplar-arrows": "exemplar *I*",
     "coarse": "coarse motion *L*", "coarse-colour": "coarse motion *L*", "detail": "detail *H′*",
-    "detail-colour": "detail *H′*", "detail-arrows": "detail *H′*", "combined": "*F* = *L* + *ωH′*",
+    "detail-colour": "detail *H′*", "detail-arrows": "detail *H′*",
+    "detail-divergence": "sources and sinks of *H′*", "combined": "*F* = *L* + *ωH′*",
     "combined-colour": "*F* = *L* + *ωH′*", "result": "result",
 }
 METHODS = ("render.layout", "render.film", "render.lic")

@@ -125,7 +125,7 @@ class Shown:
 
     @property
     def style(self) -> str:
-        """Lines, colour or arrows."""
+        """Lines, colour, arrows or divergence."""
         return self.panel.partition("-")[2] or "lines"
 
     @property
@@ -191,7 +191,7 @@ def _flat_walls(scene: Scene, stock: Stock) -> np.ndarray:
 
 
 def maker(panel: Shown) -> Callable[[Scene, Stock, list[int]], Iterator[tuple[int, np.ndarray]]]:
-    """Makes the pictures of a field: lines, colour or arrows."""
+    """Makes the pictures of a field: lines, colour, arrows or divergence."""
 
     def make(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
         from render import film, lic
@@ -199,7 +199,8 @@ def maker(panel: Shown) -> Callable[[Scene, Stock, list[int]], Iterator[tuple[in
         width = scene.figure.panel
         for frame in frames:
             values = field_values(panel, scene, stock, frame)
-            shown = lic.colour(values, width) if panel.style == "colour" else lic.picture(values, width, scene.seed)
+            drawn = {"colour": lic.colour, "divergence": lic.divergence}.get(panel.style)
+            shown = drawn(values, width) if drawn else lic.picture(values, width, scene.seed)
             if scene.obstacles and panel.panel.partition("-")[0] != "exemplar":
                 shown = lic.with_solids(shown, _flat_walls(scene, stock))
             if panel.style == "arrows":

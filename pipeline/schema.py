@@ -424,7 +424,7 @@ class NoRender(Table):
 
 
 Panel = Literal["input", "exemplar", "exemplar-colour", "exemplar-arrows", "coarse", "coarse-colour", "detail",
-                "detail-colour", "detail-arrows", "combined", "combined-colour", "result"]
+                "detail-colour", "detail-arrows", "detail-divergence", "combined", "combined-colour", "result"]
 
 
 def is_of_exemplar(panel: str) -> bool:

@@ -1,4 +1,4 @@
-"""Pictures of vector fields: line integral convolution (Cabral and Leedom 1993) and direction as colour.
+"""Pictures of vector fields: line integral convolution (Cabral and Leedom 1993), direction and divergence as colour.
 
 As in ma09 figure 4, LIC leaves zero vectors as white noise that is not integrated, with reduced amplitude.
 Fields have y up (row 0 is the bottom); the pictures have their top row first.
@@ -12,6 +12,7 @@ import numpy as np
 from scipy import ndimage, sparse
 
 from render import film
+from synth.projection import divergence as _divergence
 
 OVERSAMPLING = 2  # lines are finished on a grid this much finer and averaged down: no jagged streaks
 STREAK = 0.13  # length of the convolution kernel as a share of the picture's larger side
@@ -21,6 +22,7 @@ THREAD = 0.5  # and of the noise that is convolved, which the passes and their s
 CONTRAST = 0.24  # standard deviation of integrated lines about mid grey
 STILL_CONTRAST = 0.055  # of the noise where the field is zero: the "reduced amplitude"
 STILL, MOVING = 0.004, 0.03  # magnitudes, as shares of the largest, between which lines fade in
+FULL = 0.6  # divergence, as a share of the field's rms gradient, that has the deepest colour
 SPLINE_BORDER = 12  # cells after which a spline's coefficient has forgotten its neighbour, in float32
 
 
@@ -194,6 +196,21 @@ def colour(v: np.ndarray, width: int) -> np.ndarray:
     strength = _strength(fine)
     angle = np.arctan2(fine[..., 1], fine[..., 0])
     return _hued(1.0 - 0.30 * strength, 0.19 * strength, angle)[::-1].copy()
+
+
+def divergence(v: np.ndarray, width: int) -> np.ndarray:
+    """The divergence of `v` (Y, X, 2), y up: (h, width, 3) float32 display values, top row first.
+
+    Sources are red and sinks blue, the deeper the stronger in proportion to the rms gradient of `v`; none is white.
+    """
+    v = _checked(v)
+    gradient = np.sqrt(sum(np.mean(np.gradient(v[..., c], axis=axis) ** 2) for c in (0, 1) for axis in (0, 1)))
+    # at the border a difference would need what lies beyond it
+    found = np.pad(_divergence(v)[1:-1, 1:-1], 1, mode="edge") if min(v.shape[:2]) > 2 else np.zeros(v.shape[:2])
+    share = found / max(float(gradient), 1e-12) / FULL
+    fine = np.clip(resampled(share.astype(np.float32), height_for(v.shape, width), width, order=3), -1, 1)
+    strength = np.abs(fine)
+    return _hued(1.0 - 0.42 * strength, 0.2 * strength, np.where(fine > 0, 0.0, np.deg2rad(235.0)))[::-1].copy()
 
 
 def picture(v: np.ndarray, width: int, seed: int = 1, tint: bool = False) -> np.ndarray:

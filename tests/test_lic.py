@@ -148,3 +148,15 @@ def test_a_solid_is_plain_and_has_a_line_round_it():
     shown = lic.with_solids(np.full((60, 90, 3), 0.5, np.float32), distance)
     assert np.allclose(shown[60 - 39, 45], lic.SOLID) and np.allclose(shown[50, 80], 0.5)  # y up
     assert shown.min() < 0.2
+
+
+def test_divergence_is_red_in_a_source_blue_in_a_sink_and_white_in_a_curl():
+    y, x = np.mgrid[:24, :24] - 11.5
+    bump = np.exp(-(x**2 + y**2) / 30)
+    source = np.stack([x * bump, y * bump], -1).astype(np.float32)
+    centre = np.s_[20:28, 20:28]
+    red, blue = (lic.divergence(sign * source, 48)[centre].mean(axis=(0, 1)) for sign in (1, -1))
+    assert red[0] > 0.8 > 0.6 > red[2] and blue[2] > 0.8 > 0.6 > blue[0]
+    dy, dx = np.gradient(bump)
+    np.testing.assert_allclose(lic.divergence(np.stack([dy, -dx], -1), 48), 1, atol=1e-3)
+    assert lic.divergence(np.zeros((2, 5, 2)), 10).shape == (4, 10, 3)
