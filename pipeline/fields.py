@@ -223,6 +223,20 @@ def solid_settings(scene: Scene) -> Any:
     return solid.Settings(levels, wanted.neighborhoods, wanted.iterations, wanted.search, wanted.k, wanted.along)
 
 
+def detail_memory(scene: Scene) -> tuple[float, str]:
+    """Bytes that the synthesis of a 3-D H takes, and the key that decides."""
+    from synth.motion import solid
+
+    cells = {name: np.broadcast_to(np.float32(1), _exemplar_shape(value_at(scene, key)))
+             for name, key in scene.exemplars.items()}  # stand-ins that take no memory
+    return solid.memory_needed(solid_views(scene, cells), _solid_shape(scene), solid_settings(scene)), "detail.size"
+
+
+def _exemplar_shape(exemplar: Any) -> tuple[int, ...]:
+    dimension = 3 if getattr(exemplar, "solid", False) else 2
+    return (exemplar.size,) * dimension + (dimension,)
+
+
 def coarse_cells(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
     """L (Y, X, 2) or (Z, Y, X, 3) on the cells of H, cells per frame."""
     from synth.motion.coarse import upsample
@@ -314,7 +328,7 @@ def products(scene: Scene) -> tuple[Product, ...]:
         inputs=(*((name, "once") for name in known), ("L", "until"), *out_of_smoke,
                 *(solid if scene.detail.boundary else ())),
         methods=(_method(scene), "synth.motion.coarse", "synth.field"),
-        make=make_detail, write=write_detail, read=read_field))
+        make=make_detail, write=write_detail, read=read_field, memory=None if flat else detail_memory))
     return tuple(made)
 
 

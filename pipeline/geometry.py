@@ -59,6 +59,16 @@ def make_final(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[
         yield frame, Field.centred(final_motion(scene, stock, frame), scene.dimension).per_second(scene.fps)
 
 
+def _require_smoke(scene: Scene) -> None:
+    """ValueError unless some source lets smoke in, in some frame: a density of zero is nothing to render."""
+    from synth.motion.density import density_shape
+
+    shape = density_shape(scene.shape, scene.density.scale)
+    if not any(source.bounds(shape, frame)[1].any() for frame in range(1, scene.frames + 1)
+               for source in sources(scene)):
+        raise ValueError("no smoke enters: each source lies outside the domain, or its level or duty is 0")
+
+
 def _placed(scene: Scene, density: np.ndarray) -> Field:
     """A density where it was made, or one of the plane with the body that [density.depth] gives it."""
     if scene.density.depth is None:
@@ -68,10 +78,20 @@ def _placed(scene: Scene, density: np.ndarray) -> Field:
     return Field.centred(inflate(density, scene.density.depth.reach), 3)
 
 
+def density_memory(scene: Scene) -> tuple[float, str]:
+    """Bytes that the density takes, and the key that decides. The detail's frames come one by one."""
+    from synth.motion.density import memory_needed
+
+    wanted = scene.density
+    m = wanted.m if wanted.scheme == "windowed" else 1
+    return memory_needed(scene.shape, m, wanted.scale), "density.scale" if wanted.scale > 1 else "detail.size"
+
+
 def make_density(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
     """The density. A few frames of many are made one by one, which gives the same bits as all in a row."""
     wanted = scene.density
     last = frames[-1]
+    _require_smoke(scene)
     F = (_carried(scene, stock, frame) for frame in range(1, last + 1))
     settings: dict[str, Any] = {"scale": wanted.scale, "border": wanted.border}
     if wanted.scheme == "naive":
@@ -119,8 +139,9 @@ def _single_windows(scene: Scene, stock: Stock, frames: list[int], settings: dic
 def _window(scene: Scene, stock: Stock, O: np.ndarray | None, frame: int, settings: dict[str, Any]) -> Field:
     from synth.motion.density import window
 
-    motion = [_carried(scene, stock, i) for i in range(max(frame - scene.density.m, 0) + 1, frame + 1)]
-    values = window(O, motion, sources(scene), frame, **settings)
+    first = max(frame - scene.density.m, 0) + 1
+    motion = (_carried(scene, stock, i) for i in range(first, frame + 1))
+    values = window(O, motion, sources(scene), first, **settings)
     return _placed(scene, values)
 
 
@@ -235,7 +256,7 @@ def products(scene: Scene) -> tuple[Product, ...]:
         name="density", stage="bake", folder="geometry", suffix=_density_suffix,
         reads=("density", "combine", *LOCAL_FRAME, "seed", "fps"), inputs=(*every, *solid),
         methods=("synth.motion.density", "synth.motion.depth", *TRANSFORM), make=make_density, write=write_field,
-        read=read_field)
+        read=read_field, memory=density_memory)
     particles = Product(
         name="particles", stage="bake", folder="geometry", suffix=_ply,
         reads=("particles", "combine", *LOCAL_FRAME, "seed", "fps"), inputs=(*every, *obstacles.inputs(scene)),

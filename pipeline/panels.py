@@ -59,6 +59,8 @@ def _smoke_pictures(scene: Scene, stock: Stock, frames: list[int], method: str) 
     settings: Any = scene.render
     for frame in frames:
         density = stock.read("density", frame)
+        if frame == (scene.figure.frame or scene.frames) and not density.values.any():
+            raise ValueError(f"there is no smoke in frame {frame}, which the figure shows: nothing to render")
         match settings.kind:
             case "lit":
                 yield frame, smoke.lit(density.values, settings.width)

@@ -41,6 +41,7 @@ class Product:
     make    make(scene, stock, frames): yields (frame, value) for each of `frames` (ascending), in that order
     write   write(file, value, scene); `read` is its inverse
     still   of an animated product: whether there is only the frame that the still shows
+    memory  bytes that make takes at its peak, an estimate from above, and the key that decides it; None: little
     """
 
     name: str
@@ -55,6 +56,7 @@ class Product:
     read: Callable[[Path, Scene], Any]
     animated: bool = True
     still: bool = False
+    memory: Callable[[Scene], tuple[float, str]] | None = None
 
     def file(self, scene: Scene, frame: int) -> str:
         """File name of a frame."""

@@ -7,13 +7,14 @@ whole file, a changed ω re-bakes and does not re-synthesize, and variants share
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from pipeline import fields, geometry, manifest, obstacles, panels, sources
-from pipeline.errors import BadInput
+from pipeline.errors import BadInput, StorageFailed
 from pipeline.manifest import Entry, Folder
 from pipeline.product import Product
 from pipeline.progress import Progress
@@ -123,6 +124,22 @@ class Works:
             raise BadInput(self.scenes.file, product.file(self.scenes.variants[variant], frame), reason)
         return entry
 
+    def require_memory(self, stage: str, frames: Sequence[int] | None) -> None:
+        """Refuse what is missing of a stage and too large for this machine, before anything is allocated."""
+        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        for variant, products in self.products.items():
+            scene = self.scenes.variants[variant]
+            for product in products.values():
+                if product.stage != stage or product.memory is None:
+                    continue
+                if not self.missing(variant, product.name, frames or product.frames(scene)):
+                    continue
+                needed, key = product.memory(scene)
+                if needed > there:
+                    size = "×".join(map(str, scene.detail.size))
+                    raise StorageFailed(f"{self.scenes.file}: {key}", f"{product.name} on {size} cells needs "
+                                        f"{needed / 1e9:,.0f} GB of memory; this machine has {there / 1e9:,.0f} GB")
+
     # -- making -------------------------------------------------------------------------------------------------
 
     def make(self, stage: str, frames: Sequence[int] | None, progress: Progress) -> None:
@@ -219,7 +236,10 @@ class _Stock:
 def run(verb: str, scenes: Scenes, out: Path, progress: Progress, frames: Sequence[int] | None = None) -> None:
     """Run a stage; without `frames`, the stages before it first, as far as they are not up to date."""
     works = Works(scenes, out)
-    for stage in VERBS[: VERBS.index(verb) + 1] if frames is None else [verb]:
+    verbs = VERBS[: VERBS.index(verb) + 1] if frames is None else [verb]
+    for stage in verbs:
+        works.require_memory(stage, frames)
+    for stage in verbs:
         if stage == "figure":
             from pipeline import figure
 

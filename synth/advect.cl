@@ -88,11 +88,10 @@ kernel void departure(global const float *restrict velocities, global float *res
     JOIN(vstore, DIMS)(-dt * middle, cell, displacements);
 }
 
-// q(x + d(x)), linearly interpolated; q is (cells, CHANNELS), d is (cells, DIMS).
-inline quantity at_departure(global const float *restrict q, global const float *restrict displacements,
-                             const int x, const int y, const int z, const int X, const int Y, const int Z)
+// q(x + d), linearly interpolated; q is (cells, CHANNELS).
+inline quantity displaced(global const float *restrict q, const velocity d, const int x, const int y, const int z,
+                          const int X, const int Y, const int Z)
 {
-    const velocity d = LOAD_VELOCITY((z * Y + y) * X + x, displacements);
     SPLIT(i, u, x, d.x);
     SPLIT(j, v, y, d.y);
 #if DIMS == 3
@@ -104,6 +103,13 @@ inline quantity at_departure(global const float *restrict q, global const float 
     const bool interior = i >= 0 & i < X - 1 & j >= 0 & j < Y - 1;
     return interior ? SQUARE(NEAR, z) : SQUARE(CORNER, z);
 #endif
+}
+
+// q(x + d(x)); d is (cells, DIMS).
+inline quantity at_departure(global const float *restrict q, global const float *restrict displacements,
+                             const int x, const int y, const int z, const int X, const int Y, const int Z)
+{
+    return displaced(q, LOAD_VELOCITY((z * Y + y) * X + x, displacements), x, y, z, X, Y, Z);
 }
 
 // One step: out = q carried along d.

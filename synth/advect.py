@@ -115,16 +115,16 @@ def departure_reference(v: np.ndarray, dt: float = 1.0, border: str = "clamp") -
     """`departure` in NumPy: d = -dt v(x - dt/2 v(x))."""
     step = np.float32(dt)
     half_way = np.float32(-0.5) * step * v
-    return -step * _at(v, half_way, "clamp" if border == "zero" else border)
+    return -step * displaced_reference(v, half_way, "clamp" if border == "zero" else border)
 
 
 def advect_reference(q: np.ndarray, v: np.ndarray, dt: float = 1.0, border: str = "clamp") -> np.ndarray:
     """`advect` in NumPy."""
     channels = q.reshape(*v.shape[:-1], -1)
-    return _at(channels, departure_reference(v, dt, border), border).reshape(q.shape)
+    return displaced_reference(channels, departure_reference(v, dt, border), border).reshape(q.shape)
 
 
-def _at(q: np.ndarray, displacement: np.ndarray, border: str) -> np.ndarray:
+def displaced_reference(q: np.ndarray, displacement: np.ndarray, border: str) -> np.ndarray:
     """q (cells, C) at each cell plus its displacement (cells, D): linear along x, then y, then z."""
     shape = displacement.shape[:-1]
     axes = range(len(shape) - 1, -1, -1)  # the array axis of component 0, 1(, 2)

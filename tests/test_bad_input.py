@@ -1,8 +1,10 @@
 """Bad input and bad surroundings, end to end: one line, the right exit code, nothing half-written."""
 
 import os
+import re
 import resource
 import shutil
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -189,6 +191,131 @@ def test_a_hostile_drawing_opens_nothing(home: Path, capsys: pytest.CaptureFixtu
     (home / "a.svg").write_text('<!DOCTYPE svg [<!ENTITY x SYSTEM "file:///etc/passwd">]><svg>&x;</svg>')
     line = refused(scene('kind = "drawing"\nfile = "a.svg"'), capsys)
     assert line.startswith("tiny.toml: exemplar: ")
+
+
+SOLID = scene().replace("[8, 8]", "[8, 8, 8]").replace("[16, 16]", "[16, 16, 16]").replace(
+    'kind = "lit"\nwidth = 16', 'kind = "volume"\nwidth = 16\nheight = 16\nspp = 1\ndenoised = false').replace(
+    "m = 1\n", "m = 1\nsources = [{ centre = [0.0, 0.5], radius = 0.3 }]\n").replace(
+    "iterations = 1", "iterations = 1\nlevels = 1")
+
+
+def windy(file: str) -> str:
+    """SOLID with L from a file."""
+    return SOLID.replace(ANALYTIC.replace("[8, 8]", "[8, 8, 8]"), f'kind = "file"\nfile = "{file}"')
+
+
+def test_a_scene_in_space_goes_through(home: Path) -> None:
+    Path("tiny.toml").write_text(SOLID)
+    assert cli.run(["figure", "tiny.toml"]) == 0
+    made = {file.relative_to("out/tiny").as_posix() for file in Path("out/tiny").rglob("*.exr")}
+    assert made == {"fields/exemplar.exr", "images/beauty.0001.exr", "images/beauty.0002.exr"}
+    volume = volumes.read(Path("out/tiny/geometry/F.0002.vdb"))["vel"]
+    assert (volume.shape, volume.origin) == ((16, 16, 16), Field.centred(volume.values, 3).origin)
+
+
+@pytest.mark.parametrize(("old", "new", "expected"), [
+    ("[coarse]", '[[views]]\nplane = "top"\n[coarse]',
+     "tiny.toml: views: do not span space: none of them shows y of the local frame"),
+    ("[coarse]", "[[views]]\nplane = 'top'\n[[views]]\nplane = 'side'\nexemplar = { kind = 'heart', size = 17 }\n"
+     "[coarse]", "tiny.toml: views[1].exemplar.size: an exemplar of 17² is larger than the output (16×16×16) along an "
+                 "axis of its view"),
+    ("size = [8, 8, 8]", "size = [8, 8]", "tiny.toml: coarse.size: 8×8 has not as many axes as detail.size, 16×16×16"),
+])
+def test_a_bad_scene_in_space(home: Path, capsys: pytest.CaptureFixture[str], old: str, new: str,
+                              expected: str) -> None:
+    assert expected == refused(SOLID.replace(old, new, 1), capsys)
+
+
+def test_exemplars_of_different_scale(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = SOLID.replace("[16, 16, 16]", "[48, 48, 48]").replace("[coarse]", (
+        "[[views]]\nplane = 'top'\n[[views]]\nplane = 'side'\nexemplar = { kind = 'heart', size = 40 }\n[coarse]"))
+    assert refused(text, capsys) == (
+        "tiny.toml: views[1].exemplar.size: an exemplar of 40² beside one of 8²: at most 4 times as large")
+
+
+@pytest.mark.parametrize(("old", "new", "key", "what"), [
+    ("size = [16, 16, 16]", "size = [4096, 4096, 4096]", "detail.size", "H"),
+    ("size = [16, 16, 16]", "size = [16, 16, 16]", "density.scale", "density"),
+])
+def test_a_field_too_large_for_memory_is_refused_with_its_size(
+        home: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, old: str, new: str, key: str,
+        what: str) -> None:
+    if what == "density":  # a machine on which the field fits and its smoke does not
+        monkeypatch.setattr(os, "sysconf", {"SC_PHYS_PAGES": 1000000, "SC_PAGE_SIZE": 4096}.__getitem__)
+        new = "size = [64, 64, 64]"
+    line = refused(SOLID.replace(old, new).replace("scale = 1", "scale = 8"), capsys, code=4)
+    cells = "×".join(new.split("[")[1].rstrip("]").split(", "))
+    assert re.fullmatch(rf"tiny\.toml: {key}: {what} on {cells} cells needs [\d,]+ GB of memory; this machine has "
+                        r"[\d,]+ GB", line), line
+
+
+@pytest.mark.parametrize(("name", "made", "expected"), [
+    ("a.exr", field(), "is flat, and detail.size is not"),
+    ("a.vdb", field(shape=(16, 16, 24, 3)), "24×16×16 has not the shape of detail.size, 16×16×16"),
+    ("a.vdb", field(shape=(16, 16, 16, 3), value=1e30), "cells per frame"),
+])
+def test_a_coarse_motion_that_does_not_do_in_space(home: Path, capsys: pytest.CaptureFixture[str], name: str,
+                                                   made: Field, expected: str) -> None:
+    if name == "a.exr":
+        images.write_field(home / name, made)
+    else:
+        volumes.write(home / name, {"vel": made})
+    Path("tiny.toml").write_text(windy(name))
+    assert cli.run(["figure", "tiny.toml"]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert expected in err
+
+
+def written_stretched(path: Path, sizes: tuple[float, float, float]) -> None:
+    """A VDB with voxels of these sizes, which our own writer never writes."""
+    volumes.write(path, {"vel": Field(np.ones((16, 16, 16, 3), np.float32), 0.125, (-1.0, -1.0, -1.0))})
+    # the scale map holds the sizes, their inverses and the like as doubles: each axis has its own
+    content = path.read_bytes()
+    for number, inverse in ((0.125, False), (8.0, True)):
+        packed = struct.pack("<3d", *[number] * 3)
+        stretched = struct.pack("<3d", *(1 / s if inverse else s for s in sizes))
+        assert packed in content
+        content = content.replace(packed, stretched)
+    path.write_bytes(content)
+
+
+def test_anisotropic_voxels(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    written_stretched(home / "a.vdb", (0.125, 0.25, 0.125))
+    line = refused(windy("a.vdb"), capsys)
+    assert "a.vdb: coarse.file: " in line
+    assert "anisotropic voxels (0.125 x 0.25 x 0.125); resample the grid to cubes" in line
+
+
+def test_a_negative_origin_is_moved_onto_the_domain(home: Path) -> None:
+    values = np.random.default_rng(1).random((16, 16, 16, 3), np.float32)
+    results = []
+    for name, origin in (("near", (0.0, 0.0, 0.0)), ("far", (-300.5, -20.25, -7.0))):
+        volumes.write(home / "a.vdb", {"vel": Field(values, 0.5, origin)})
+        Path("tiny.toml").write_text(windy("a.vdb"))
+        assert cli.run(["bake", "tiny.toml", "--out", name]) == 0
+        results.append({file.name: file.read_bytes() for file in Path(name).rglob("*.vdb")})
+    assert results[0] == results[1]
+    assert len(results[0]) == 8
+
+
+@pytest.mark.parametrize("source", [
+    "centre = [0.0, 0.5], radius = 0.3, level = 0.0", "centre = [0.0, 0.5], radius = 0.3, duty = 0.0",
+    "centre = [9.0, 0.5], radius = 0.3", "centre = [0.0, 0.5, -4.0], radius = 0.3"])
+def test_a_density_of_zero(home: Path, capsys: pytest.CaptureFixture[str], source: str) -> None:
+    Path("tiny.toml").write_text(SOLID.replace("centre = [0.0, 0.5], radius = 0.3", source))
+    assert cli.run(["figure", "tiny.toml"]) == 2
+    assert capsys.readouterr().err == (
+        "tiny.toml: density: no smoke enters: each source lies outside the domain, or its level or duty is 0\n")
+    assert not list(Path("out").rglob("density*"))
+
+
+def test_a_figure_of_a_frame_without_smoke(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    blown_away = SOLID.replace("omega = 0.5", "omega = 0.0").replace("[8, 8, 8]", "[8, 8, 8]\nspeed = 50.0")
+    Path("tiny.toml").write_text(blown_away)
+    assert cli.run(["figure", "tiny.toml"]) == 2
+    assert capsys.readouterr().err == (
+        "tiny.toml: render: there is no smoke in frame 2, which the figure shows: nothing to render\n")
 
 
 def ended(arguments: list[str], **settings: object) -> subprocess.CompletedProcess[str]:

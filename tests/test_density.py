@@ -11,10 +11,19 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from synth.advect import advect_reference
+from synth.advect import advect_reference, displaced_reference
 from synth.field import domain_origin
 from synth.motion.coarse import upsample
-from synth.motion.density import THINNEST, Carried, Source, naive, window, windowed
+from synth.motion.density import (
+    THINNEST,
+    Carried,
+    Source,
+    memory_needed,
+    naive,
+    riding_reference,
+    window,
+    windowed,
+)
 
 
 def flows(shape, n, seed=0, speed=1.5):
@@ -96,7 +105,7 @@ def test_streaming_equals_pseudocode_4_as_written(shape, m):
         start = max(0, i - m)
         *_, D = reference(F[start:i], SOURCES, O[start], start)
         np.testing.assert_array_equal(streamed[i - 1], D)
-        np.testing.assert_array_equal(window(O[start], F[start:i], SOURCES, i), D)
+        np.testing.assert_array_equal(window(O[start], F[start:i], SOURCES, start + 1), D)
     assert any(not np.array_equal(a, b) for a, b in zip(streamed, naive(F, SOURCES), strict=True))
 
 
@@ -131,6 +140,21 @@ def test_a_coarser_l_is_upsampled_as_f_was():
 def test_detail_that_is_nothing_rides_on_l_without_a_trace(shape):
     L = flows(shape, 8)
     equal(naive([Carried(v, v) for v in L], SOURCES), naive(L, SOURCES))
+
+
+@pytest.mark.parametrize("shape", [(5, 7), (2, 2), (5, 7, 3), (2, 2, 2), (3, 9, 70)])
+@pytest.mark.parametrize("border", ["zero", "clamp", "toroidal"])
+def test_riding_detail_is_its_specification(shape, border):
+    L, F, full = flows(shape, 2), flows(shape, 2, seed=1, speed=2.5), [Source((0.0, 0.5), 9.0, streaks=0.7)]
+    density = np.zeros(shape, np.float32)
+    found = naive([Carried(f, l) for l, f in zip(L, F, strict=True)], full, border=border)
+    for i, (l, f, D) in enumerate(zip(L, F, found, strict=True), 1):
+        box, lowest, highest = full[0].bounds(shape, i)
+        density[box] = np.minimum(np.maximum(density[box], lowest), highest)
+        way = riding_reference(l, f - l, border)
+        density = displaced_reference(density[..., None], way, border)[..., 0]
+        density[density < np.float32(THINNEST)] = 0
+        np.testing.assert_array_equal(D, density)
 
 
 def test_smoke_in_a_swirl_that_is_carried_on_turns_with_it():
@@ -267,9 +291,19 @@ def test_refusals():
     with pytest.raises(ValueError, match="border"):
         next(naive(F, SOURCES, border="mirror"))
     with pytest.raises(ValueError, match="O has shape"):
-        window(np.zeros((4, 4), np.float32), F, SOURCES, 2)
+        window(np.zeros((4, 4), np.float32), F, SOURCES, 1)
+    with pytest.raises(ValueError, match="at least one"):
+        window(None, [], SOURCES, 1)
     with pytest.raises(ValueError, match="NaN"):
         list(naive([F[0], F[1] * np.nan], SOURCES))
+
+
+def test_the_memory_it_says_grows_with_cells_and_with_the_window():
+    one = memory_needed((16, 64, 64), 16)
+    assert memory_needed((32, 64, 64), 16) == pytest.approx(2 * one)
+    assert one < memory_needed((16, 64, 64), 17) < 1.5 * one  # a second group of lanes
+    assert memory_needed((16, 64, 64), 16, scale=2) > 4 * one
+    assert memory_needed((4096, 4096, 4096), 16) > 1e13
 
 
 # Repeatability: another process, one thread, cold kernel cache.

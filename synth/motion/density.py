@@ -23,13 +23,24 @@ from typing import Any
 import numpy as np
 
 from synth import opencl
-from synth.advect import BORDERS, ROW, Grid, Region, velocity_field
+from synth.advect import (
+    BORDERS,
+    ROW,
+    Grid,
+    Region,
+    departure_reference,
+    displaced_reference,
+    velocity_field,
+)
 from synth.field import domain_origin
 from synth.motion.coarse import upsample
 from synth.noise import gradient_noise
 
 SUBSTEPS = 4
 """Steps in which smoke is traced along the detail of a frame."""
+
+MOTIONS = 24
+"""Fields of vectors that memory holds at once, on their own cells: as measured, what the allocator keeps included."""
 
 THINNEST = 1e-5
 """Thinner smoke is gone: nobody can see it, and interpolation would spread it over the grid for ever."""
@@ -156,7 +167,7 @@ def naive(F_frames: Iterable[Motion], sources: Sequence[Source], *, scale: float
     density = None
     for i, F in enumerate(F_frames, 1):
         if density is None:
-            density = _Lanes(_scaled(F, scale), 1, border)
+            density = _Lanes(density_shape(F.shape[:-1], scale), 1, border)
         density.inject(sources, i)
         density.advance(F, F.shape[:-1])
         yield density.q.get()
@@ -178,7 +189,7 @@ def windowed(L_frames: Iterable[np.ndarray], F_frames: Iterable[Motion], sources
     windows: list[_Lanes] = []
     for i, (L, F) in enumerate(zip(L_frames, F_frames, strict=True), 1):
         if coarse is None:
-            coarse = _Lanes(_scaled(F, scale), 1, border)
+            coarse = _Lanes(density_shape(F.shape[:-1], scale), 1, border)
             lanes = min(16, 1 << (m - 1).bit_length())
             windows = [_Lanes(coarse.shape, lanes, border) for _ in range(-(-m // lanes))]
             visible = opencl.empty(coarse.shape)
@@ -195,28 +206,40 @@ def windowed(L_frames: Iterable[np.ndarray], F_frames: Iterable[Motion], sources
         yield visible.get()
 
 
-def window(O: np.ndarray | None, F_frames: Sequence[Motion], sources: Sequence[Source], i: int, *,
+def window(O: np.ndarray | None, F_frames: Iterable[Motion], sources: Sequence[Source], first: int, *,
            scale: float = 1.0, border: str = "zero") -> np.ndarray:
     """One D_i of pseudocode 4 alone: the frame `windowed` yields as its i-th, bit for bit.
 
     O         O_{i-m} on the density grid, or None for the empty O_0
-    F_frames  F_{i-m+1} … F_i, m of them (i of them from O_0)
+    F_frames  F_{i-m+1} … F_i, m of them (i of them from O_0), of which one at a time is held; at least one
+    first     the number i - m + 1 of the first of them
     """
-    density = _Lanes(_scaled(F_frames[0], scale), 1, border)
-    if O is not None:
-        if O.shape != density.shape:
-            raise ValueError(f"O has shape {O.shape}, the density grid {density.shape}")
-        density.begin(O)
-    for j, F in enumerate(F_frames, i - len(F_frames) + 1):
+    density: _Lanes | None = None
+    for j, F in enumerate(F_frames, first):
+        if density is None:
+            density = _Lanes(density_shape(F.shape[:-1], scale), 1, border)
+            if O is not None:
+                density.begin(O)
         density.inject(sources, j)
         density.advance(F, F.shape[:-1])
+    if density is None:
+        raise ValueError("a window needs at least one frame of motion")
     return density.q.get()
 
 
-def _scaled(F: Motion, scale: float) -> tuple[int, ...]:
+def memory_needed(shape: tuple[int, ...], m: int, scale: float = 1.0) -> float:
+    """Bytes that `windowed` takes on cells of `shape`, host and device together; an estimate from above."""
+    cells = float(np.prod([float(n) for n in shape]))
+    lanes = min(16, 1 << (m - 1).bit_length())
+    fine = 8 * (lanes * -(-m // lanes) + 1) + 4 + 12 * len(shape) + 2 * MOTIONS * len(shape)
+    return cells * (scale ** len(shape) * fine + MOTIONS * len(shape) * 4)
+
+
+def density_shape(shape: tuple[int, ...], scale: float) -> tuple[int, ...]:
+    """The density's cells over a field's, `scale` of them to one along each axis."""
     if not (np.isfinite(scale) and scale > 0):
         raise ValueError(f"the density's scale must be positive, not {scale}")
-    return tuple(max(1, round(n * scale)) for n in F.shape[:-1])
+    return tuple(max(1, round(n * scale)) for n in shape)
 
 
 Box = tuple[tuple[int, int], ...]
@@ -236,25 +259,60 @@ class _Flow:
     reach  no displacement is longer along any axis, cells
     """
 
-    def __init__(self, v: Motion, field_shape: tuple[int, ...], grid: Grid, buffer: Any):
-        """v on its own cells goes linearly to the field's, from there smoothly to the density's."""
-        self._grid, self._buffer = grid, buffer
-        self._riding: Any = None
+    def __init__(self, v: Motion, field_shape: tuple[int, ...], grid: Grid, buffers: list[Any]):
+        """v on its own cells goes linearly to the field's, from there smoothly to the density's. buffers: arrays of
+        displacements, one, or three for a detail that rides; they hold what this gives."""
+        self._grid, self._buffers = grid, buffers
         if isinstance(v, Carried):
             L = _finer(v.L, v.shape[:-1], grid)
             detail = _finer(v.F, v.shape[:-1], grid) - L
-            self._riding = _riding(L, detail, grid)
+            self._motions = [opencl.to_device(detail), opencl.to_device(L)]
             self.reach = _longest(L) + _longest(detail)
         else:
             fine = _finer(v, field_shape, grid)
-            self._v = opencl.to_device(fine)
+            self._motions = [opencl.to_device(fine)]
             self.reach = _longest(fine)
 
     def displacements(self, region: Region) -> Any:
         """The displacements, on the device, valid in `region`."""
-        if self._riding is not None:
-            return self._riding
-        return self._grid.departure(self._v, out=self._buffer, region=region)
+        if len(self._motions) == 1:
+            return self._grid.departure(self._motions[0], out=self._buffers[0], region=region)
+        inside = Grid(self._grid.shape, "toroidal" if self._grid.border == "toroidal" else "clamp")
+        near = self._near(region)
+        way, detail, coarse = self._buffers
+        inside.departure(self._motions[0], 1 / SUBSTEPS, detail, near)
+        inside.departure(self._motions[1], out=coarse, region=near)
+        dimension = len(self._grid.shape)
+        program = opencl.program(Path(__file__).with_suffix(".cl"), DIMS=dimension, CHANNELS=dimension,
+                                 BORDER=BORDERS[inside.border], THINNEST=f"{THINNEST}f")
+        program.ride(region.size, (ROW, 1, 1), detail, coarse, way, np.int32(SUBSTEPS), *self._grid.cells,
+                     offset=region.first)
+        return way
+
+    def _near(self, region: Region) -> Region:
+        """The cells that a way which begins in `region` can pass."""
+        if self._grid.border == "toroidal":
+            return self._grid.whole
+        grown = [(max(first - self.reach, 0), min(first + size + self.reach, n))
+                 for first, size, n in zip(region.first, region.size, self._grid.whole.size, strict=True)]
+        return _rows(grown)
+
+
+def _rows(box: Sequence[tuple[int, int]]) -> Region:
+    """A box of cells as a region: along x in whole work-groups."""
+    (x, x_end), (y, y_end), (z, z_end) = box
+    x -= x % ROW
+    return Region((x, y, z), (-(-(x_end - x) // ROW) * ROW, y_end - y, z_end - z))
+
+
+def riding_reference(L: np.ndarray, detail: np.ndarray, border: str = "zero") -> np.ndarray:
+    """Specification of the kernel `ride`: displacements of one frame of L and F - L, both (Y, X, 2) or (Z, Y, X, 3)."""
+    inside = "toroidal" if border == "toroidal" else "clamp"
+    substep = departure_reference(detail, 1 / SUBSTEPS, inside)
+    way = substep
+    for _ in range(SUBSTEPS - 1):
+        way = way + displaced_reference(substep, way, inside)
+    return way + displaced_reference(departure_reference(L, 1, inside), way, inside)
 
 
 def _longest(v: np.ndarray) -> int:
@@ -265,16 +323,6 @@ def _longest(v: np.ndarray) -> int:
 def _finer(v: np.ndarray, field_shape: tuple[int, ...], grid: Grid) -> np.ndarray:
     """`v` on the density grid: linearly to the field's cells, smoothly on to the density's."""
     return upsample(upsample(velocity_field(v), field_shape), grid.shape, "cubic")
-
-
-def _riding(L: np.ndarray, detail: np.ndarray, grid: Grid) -> Any:
-    """Back along the detail alone, as L's traveller sees it, in SUBSTEPS; then back along L."""
-    inside = Grid(grid.shape, "toroidal" if grid.border == "toroidal" else "clamp")
-    substep = inside.departure(opencl.to_device(detail), 1 / SUBSTEPS)
-    way = substep
-    for _ in range(SUBSTEPS - 1):
-        way = way + inside.gather(substep, way)
-    return way + inside.gather(inside.departure(opencl.to_device(L)), way)
 
 
 class _Lanes:
@@ -288,13 +336,15 @@ class _Lanes:
         self.grid = Grid(shape, border)
         self.q, self._next = (opencl.zeros((*shape, lanes) if lanes > 1 else shape) for _ in range(2))
         self.box = self._next_box = NOWHERE
-        self._displacements: Any = None
+        self._displacements: list[Any] = []
         self._extents = opencl.empty((*shape[:-1], 2), np.int32)
         self._program = opencl.program(Path(__file__).with_suffix(".cl"), DIMS=len(shape), CHANNELS=lanes,
                                        BORDER=BORDERS[border], THINNEST=f"{THINNEST}f")
 
     def begin(self, density: np.ndarray) -> None:
         """Take over a density (*shape); of a single lane only."""
+        if density.shape != self.shape:
+            raise ValueError(f"O has shape {density.shape}, the density grid {self.shape}")
         self.q = opencl.to_device(np.asarray(density, np.float32))
         self.box = tuple((0, n) for n in self._size())
 
@@ -311,8 +361,8 @@ class _Lanes:
 
     def flow(self, v: Motion, field_shape: tuple[int, ...]) -> _Flow:
         """The flow of one frame on this grid; the one before it is no longer valid."""
-        if self._displacements is None:
-            self._displacements = opencl.empty((*self.shape, len(self.shape)))
+        for _ in range(len(self._displacements), 3 if isinstance(v, Carried) else 1):
+            self._displacements.append(opencl.empty((*self.shape, len(self.shape))))
         return _Flow(v, field_shape, self.grid, self._displacements)
 
     def advance(self, v: Motion, field_shape: tuple[int, ...]) -> None:
@@ -349,8 +399,7 @@ class _Lanes:
             (max(first, 0), min(end, n)) for (first, end), n in zip(box, self._size(), strict=True))
         if x >= x_end or y >= y_end or z >= z_end:
             return Region((0, 0, 0), (0, 0, 0))
-        x -= x % ROW
-        return Region((x, y, z), (-(-(x_end - x) // ROW) * ROW, y_end - y, z_end - z))
+        return _rows(((x, x_end), (y, y_end), (z, z_end)))
 
     def _occupied(self, region: Region) -> Box:
         """The smallest box of all smoke, which is known to lie in `region`."""
