@@ -460,7 +460,7 @@ def carry(H: np.ndarray, motion: np.ndarray) -> np.ndarray:
 
 def _program_without_views() -> Any:
     return opencl.program(Path(__file__).with_suffix(".cl"), VOLUME=0, RADIUS=0, FOOT=0, SPACING=1, FIRST=0, BORDER=0,
-                          SEEN=0, DIMS=16, BLOCK=1, CANDIDATES=1, DAMPING="0.0f")
+                          SEEN=0, DIMS=16, BLOCK=1, BOX=BOX, CANDIDATES=1, DAMPING="0.0f")
 
 
 def _grown(field: np.ndarray) -> np.ndarray:
