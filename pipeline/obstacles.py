@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from pipeline.errors import BadInput
-from pipeline.files import images, pictures, volumes
+from pipeline.files import images, meshes, pictures, volumes
 from pipeline.product import Frames, Product, Stock
 from pipeline.schema import Scene
 from synth.field import Field
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 OUTLINE = 1024  # rows of the mask that an SVG is filled into
 WIDEST = 16.0  # of it, in its heights
+VOXEL = 0.5  # of a mesh, in cells of H
 
 
 def make_solid(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
@@ -44,6 +45,10 @@ def _solid(scene: Scene, number: int) -> Obstacle:
         case "box":
             half = wanted.radius if len(wanted.radius) > 1 else wanted.radius * scene.dimension
             return obstacle.box(scene.shape, wanted.centre, half, wanted.angle)
+        case "mesh":
+            pitch = VOXEL / scene.shape[-2]
+            filled, origin = meshes.read_solid(wanted.file, key, pitch, wanted.centre, wanted.height)
+            return obstacle.voxels(scene.shape, filled, pitch, origin)
         case "level-set":
             return obstacle.level_set(scene.shape, volumes.read_level_set(wanted.file, wanted.grid, key))
         case "mask":

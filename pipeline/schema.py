@@ -290,6 +290,17 @@ class PictureObstacle(Table):
     height: float = key("of the picture", 1.0, "heights", gt=0, le=10)
 
 
+class MeshObstacle(Table):
+    """A solid modelled elsewhere, filled with voxels; in 2-D its section at z = 0. Holes in it are closed."""
+
+    kind: Literal["mesh"] = key("a triangle mesh")
+    file: Asset = key("PLY, OBJ or STL, y upwards")
+    centre: Annotated[tuple[float, float, float], Strict(False)] | None = key(
+        "where the middle of its bounding box is put; none: where it is", None, "heights")
+    height: Annotated[float, Field(gt=0, le=10)] | None = key(
+        "to which it is scaled; none: its coordinates are heights", None, "heights")
+
+
 class LevelSetObstacle(Table):
     """A solid modelled elsewhere, where it stands in its own coordinates; in 2-D its section at z = 0."""
 
@@ -298,7 +309,7 @@ class LevelSetObstacle(Table):
     grid: str = key("its grid of class level set", "surface", min_length=1, max_length=200)
 
 
-Obstacle = Annotated[ShapeObstacle | PictureObstacle | LevelSetObstacle, Field(discriminator="kind")]
+Obstacle = Annotated[ShapeObstacle | PictureObstacle | MeshObstacle | LevelSetObstacle, Field(discriminator="kind")]
 
 
 class Combine(Table):

@@ -149,6 +149,17 @@ def level_set(shape: tuple[int, ...], field: Field) -> Obstacle:
     return Obstacle(_measured(inside.reshape([n * fine for n in shape]), fine))
 
 
+def voxels(shape: tuple[int, ...], filled: np.ndarray, pitch: float, origin: Sequence[float]) -> Obstacle:
+    """What voxels (Z, Y, X) bool fill that a surface touches or encloses, of edge `pitch` and first centre `origin`.
+
+    Its surface lies half a voxel inside them, on average. A domain of the plane is met at z = 0.
+    """
+    grown = np.pad(filled, 3)
+    away = ndimage.distance_transform_edt(~grown) - ndimage.distance_transform_edt(grown)
+    away = away - 0.5 * np.sign(away) + 0.5
+    return level_set(shape, Field(away.astype(np.float32) * pitch, pitch, tuple(o - 3 * pitch for o in origin)))
+
+
 def _measured(inside: np.ndarray, fine: int) -> np.ndarray:
     """Signed distance, in cells, of a mask with `fine` samples along each axis of a cell."""
     if not inside.any() or inside.all():

@@ -20,6 +20,7 @@ HOMES = {
     "OpenImageIO": {"pipeline/files/pictures.py", "render/layout.py"},  # files and FLIP; letters in a picture
     "av": {"pipeline/files/video.py"},
     "trimesh": {"pipeline/files/meshes.py"},
+    "pymeshlab": {"pipeline/files/mending.py"},
     "cv2": {"synth/motion/exemplar.py"},
     "svgpathtools": {"synth/motion/exemplar.py"},
     "rlic": {"render/lic.py"},

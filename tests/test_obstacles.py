@@ -117,6 +117,33 @@ def test_a_picture_a_drawing_and_a_level_set_of_a_disc() -> None:
     assert near(solid('[[obstacles]]\nkind = "level-set"\nfile = "ball.vdb"'), expected) < 0.4
 
 
+def ball_mesh(name: str = "ball.ply", radius: float = 0.2, centre: tuple[float, ...] = (0, 0.5, 0), holes: int = 0,
+              ) -> Path:
+    """A ball as a mesh in a file, `holes` of its faces taken away."""
+    import trimesh
+
+    mesh = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+    mesh.apply_translation(centre)
+    mesh.update_faces(np.arange(len(mesh.faces)) % 150 >= (1 if holes else 0))
+    mesh.export(name)
+    return Path(name)
+
+
+@pytest.mark.parametrize("name", ["ball.ply", "ball.obj", "ball.stl"])
+@pytest.mark.parametrize("holes", [0, 1])
+def test_a_mesh_of_a_ball_and_one_that_is_mended(name: str, holes: int) -> None:
+    ball_mesh(name, holes=holes)
+    expected = obstacle.ball((24, 32), (0, 0.5), 0.2).distance
+    assert near(solid(f'[[obstacles]]\nkind = "mesh"\nfile = "{name}"'), expected) < 0.35
+
+
+def test_a_mesh_is_moved_and_scaled_and_stands_in_space() -> None:
+    ball_mesh(radius=30, centre=(100, -7, 55))
+    placed = '[[obstacles]]\nkind = "mesh"\nfile = "ball.ply"\ncentre = [0.1, 0.5, 0.05]\nheight = 0.5'
+    made = solid(placed, "[32, 24, 16]", 'kind = "analytic"\nsize = [16, 12, 8]')
+    assert near(made, obstacle.ball((16, 24, 32), (0.1, 0.5, 0.05), 0.25).distance) < 0.45
+
+
 def refused(text: str, capsys: pytest.CaptureFixture[str], **settings: str) -> str:
     """The one line that running the scene ends with; nothing must have been written."""
     written(text, **settings)
@@ -147,13 +174,15 @@ def test_what_no_scene_can_have(capsys: pytest.CaptureFixture[str], text: str, s
 
 @pytest.mark.parametrize("how", ["missing", "empty", "cut short", "text"])
 @pytest.mark.parametrize(("kind", "name"), [
-    ("mask", "a.png"), ("drawing", "a.png"), ("drawing", "a.svg"), ("level-set", "ball.vdb")])
+    ("mask", "a.png"), ("drawing", "a.png"), ("drawing", "a.svg"), ("level-set", "ball.vdb"), ("mesh", "ball.ply")])
 def test_a_spoilt_file(capsys: pytest.CaptureFixture[str], kind: str, name: str, how: str) -> None:
     match name:
         case "a.png":
             pictures.write(Path(name), obstacle.outlines([np.array([[0.2, 0.2], [0.8, 0.2], [0.5, 0.8]])], (40, 40)))
         case "a.svg":
             Path(name).write_text('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><circle r="2"/></svg>')
+        case "ball.ply":
+            ball_mesh()
         case _:
             level_set()
     content = Path(name).read_bytes()
@@ -176,6 +205,21 @@ def test_pictures_and_volumes_that_are_no_obstacle(capsys: pytest.CaptureFixture
     text = '[[obstacles]]\nkind = "level-set"\nfile = "ball.vdb"'
     assert "no such grid" in refused(text, capsys)
     assert "no level set, but of class fog volume" in refused(text + '\ngrid = "density"', capsys)
+
+
+def test_meshes_that_are_no_obstacle(capsys: pytest.CaptureFixture[str]) -> None:
+    text = '[[obstacles]]\nkind = "mesh"\nfile = "a.ply"'
+    meshes.write(Path("a.ply"), np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
+    line = refused(text, capsys)
+    assert "a.ply: obstacles[0].file: is not watertight and cannot be mended: it encloses nothing" in line
+    ball_mesh("a.ply", radius=500)
+    assert "give it a height" in refused(text, capsys)
+    ball_mesh("a.ply", centre=(9, 9, 9))
+    assert "obstacles: obstacle 1 lies outside" in refused(text, capsys)
+    ball_mesh("a.ply", radius=1.2)
+    assert "fill the domain" in refused(text, capsys)
+    meshes.write_points(Path("a.ply"), np.zeros((3, 3), np.float32), {})
+    assert "holds no mesh" in refused(text, capsys)
 
 
 def test_anisotropic_voxels_are_refused() -> None:

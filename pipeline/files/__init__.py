@@ -2,9 +2,10 @@
 
 atomic      how every file comes into being: written beside its place, checked, then renamed
 shelter     how a stranger's file is read: in a child process, which a damaged file may take down
-volumes     OpenVDB: `density` and `vel` (its compiled part is openvdb.cpp)
+volumes     OpenVDB: `density`, `vel` and `surface` (its compiled part is openvdb.cpp)
 images      OpenEXR: linear pictures and 2-D fields
 pictures    8-bit PNG, and what OpenImageIO does with pictures
-meshes      PLY
+meshes      PLY of meshes and points; a stranger's mesh as voxels
+mending     closes a mesh that is not watertight (pymeshlab)
 video       H.264
 """

@@ -1,8 +1,8 @@
-"""PLY files: triangle meshes in world units, as arrays. The one home of trimesh's reading and writing."""
+"""PLY files: triangle meshes and points in world units, as arrays; strangers' meshes as voxels. The home of trimesh."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -113,3 +113,64 @@ def read(path: Path, key: str) -> tuple[np.ndarray, np.ndarray]:
     except ValueError as error:
         raise BadInput(path, key, str(error)) from error
     return found["vertices"], found["faces"]
+
+
+FORMATS = ("ply", "obj", "stl")
+MOST_VOXELS = 320**3
+SECONDS = 120.0  # to fill them
+
+
+def read_solid(path: Path, key: str, pitch: float, centre: Sequence[float] | None = None,
+               height: float | None = None) -> tuple[np.ndarray, tuple[float, ...]]:
+    """The voxels that anybody's PLY, OBJ or STL mesh fills, read in a child process: (Z, Y, X) bool, and where the
+    first one's centre lies, world units.
+
+    pitch   edge of a voxel
+    centre  (x, y, z) where the middle of its bounding box is moved to; none: where it is
+    height  of its bounding box, to which it is scaled; none: as it is
+    A mesh that is not watertight is mended. `key` is the scene's, for the error. Raises `BadInput` if the file is
+    missing or damaged, holds no mesh or one that encloses nothing, or would fill more than MOST_VOXELS voxels.
+    """
+    found = shelter.read(_voxels, path, key, pitch, centre, height, seconds=SECONDS)
+    return found["voxels"].astype(bool), tuple(found["origin"])
+
+
+def _voxels(path: Path, pitch: float, centre: Sequence[float] | None, height: float | None) -> dict[str, Any]:
+    """Runs in the child: see `read_solid`."""
+    import trimesh
+
+    from pipeline.files import mending
+
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in FORMATS:
+        raise ValueError(f"is no {', '.join(FORMATS[:-1]).upper()} or {FORMATS[-1].upper()} file")
+    with path.open("rb") as file:
+        mesh = trimesh.load_mesh(file, file_type=kind)
+    vertices, faces = getattr(mesh, "vertices", ()), getattr(mesh, "faces", ())
+    if not len(faces):
+        raise ValueError("holds no mesh")
+    _require_mesh(np.asarray(vertices), np.asarray(faces))
+    if not mesh.is_watertight:
+        mesh = trimesh.Trimesh(*mending.closed(mesh.vertices, mesh.faces))
+    volume = float(np.abs(np.einsum("ij,ij->i", *_corners(mesh)).sum())) / 6 if len(mesh.faces) > 3 else 0.0
+    if not mesh.is_watertight or not volume > 1e-9 * float(np.prod(mesh.extents)):
+        raise ValueError("is not watertight and cannot be mended: it encloses nothing")
+    scale = height / mesh.extents[1] if height else 1.0
+    middle = mesh.bounds.mean(axis=0)
+    mesh.apply_translation(-middle)
+    mesh.apply_scale(scale)
+    mesh.apply_translation(middle if centre is None else centre)
+    voxels = float(np.prod(mesh.extents / pitch + 2))
+    if voxels > MOST_VOXELS:
+        size = " x ".join(f"{e:.3g}" for e in mesh.extents)
+        raise ValueError(f"is {size} world units large, {voxels:.2g} voxels; give it a height")
+    filled = mesh.voxelized(pitch).fill()
+    # trimesh counts voxels along x, y, z
+    return {"voxels": np.ascontiguousarray(filled.matrix.transpose(2, 1, 0)).astype(np.uint8),
+            "origin": [float(o) for o in filled.transform[:3, 3]]}
+
+
+def _corners(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
+    """First corners of the triangles, and the cross products of the two others: for the volume."""
+    a, b, c = mesh.triangles.transpose(1, 0, 2)
+    return a, np.cross(b, c)

@@ -1,0 +1,31 @@
+"""The one home of pymeshlab (GPL-3), which closes meshes that are not watertight. Nothing else of flowloom needs it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+LARGEST_HOLE = 100_000  # edges round it
+
+
+def closed(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh (N, 3), (M, 3) with its holes closed, no face twice, no edge of more than two faces, turned one way round.
+
+    Runs in a child process (`shelter`), like all that touches a stranger's mesh. It need not succeed: the caller looks
+    whether the result is watertight. Raises ValueError where there is nothing to mend.
+    """
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(np.asarray(vertices, np.float64), np.asarray(faces, np.int32)))
+    try:
+        meshes.meshing_merge_close_vertices()
+        meshes.meshing_remove_duplicate_faces()
+        meshes.meshing_remove_null_faces()
+        meshes.meshing_repair_non_manifold_edges()
+        meshes.meshing_repair_non_manifold_vertices()
+        meshes.meshing_close_holes(maxholesize=LARGEST_HOLE, newfaceselected=False)
+        meshes.meshing_re_orient_faces_coherently()
+    except pymeshlab.PyMeshLabException as error:
+        raise ValueError(f"is not watertight and cannot be mended: {str(error).splitlines()[-1]}") from error
+    mended = meshes.current_mesh()
+    return np.asarray(mended.vertex_matrix(), np.float64), np.asarray(mended.face_matrix(), np.int64)
