@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,8 @@ RELAXATIONS = 15
 # tiles laid per exemplar area: squares that turn do not pack without gaps, and some tiles die out
 CROWDING = 1.1
 NEAREST = 8
+# deep blocks have many beside them
+NEAREST_BLOCKS = 16
 # a place with less than this share of the exemplar's mean square is empty; a lattice of points has 0.83 at least
 EMPTY = 0.55
 
@@ -122,34 +124,69 @@ def reseed(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray
     return H
 
 
-def blocks(frame: np.ndarray, edge: int, random: np.random.Generator) -> np.ndarray:
-    """The mosaic in three dimensions: cubes of `edge` cells turned with the frame (Z, Y, X, 3, 3) fill the domain.
+def blocks(frame: np.ndarray, edges: tuple[int, int, int], random: np.random.Generator) -> np.ndarray:
+    """The mosaic in three dimensions: blocks turned with the frame (Z, Y, X, 3, 3) fill the domain.
 
-    Returns for each cell its offset from the middle of the cube that holds it, in that cube's local frame:
-    (Z, Y, X, 3) float32. The cubes' centres relax as in `mosaics`.
+    edges are theirs along the frame's axes, cells. Returns for each cell its offset from the middle of the block that
+    holds it, along that block's axes: (Z, Y, X, 3) float32. The blocks' centres relax as in `mosaics`.
     """
     shape = frame.shape[:3]
     # x, y, z
     cells = np.stack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in shape), indexing="ij")[::-1], axis=-1)
-    count = max(1, round(CROWDING * cells[..., 0].size / edge**3))
+    count = max(1, round(CROWDING * cells[..., 0].size / np.prod(edges)))
     centres = random.random((count, 3), dtype=np.float32) * (np.array(shape[::-1], np.float32) - 1)
-    stride = max(1, edge // 8)
+    stride = max(1, min(edges) // 8)
     some = cells[::stride, ::stride, ::stride].reshape(-1, 3)
+    half = np.array(edges, np.float32) / 2
     for _ in range(RELAXATIONS):
-        nearest, _ = _block_owners(some, centres, frame)
+        nearest, _ = _block_owners(some, centres, frame, half)
         members = np.bincount(nearest, minlength=count)
         sums = np.stack([np.bincount(nearest, some[:, i], minlength=count) for i in range(3)], axis=-1)
         centres = np.where(members[:, None] > 0, sums / np.maximum(members, 1)[:, None], centres).astype(np.float32)
-    return _block_owners(cells.reshape(-1, 3), centres, frame)[1].reshape(*shape, 3)
+    return _block_owners(cells.reshape(-1, 3), centres, frame, half)[1].reshape(*shape, 3)
 
 
-def _block_owners(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For each of cells (P, 3) the centre whose turned cube holds it best, and the offset in that cube's frame."""
-    _, index = cKDTree(centres).query(cells, k=min(NEAREST, len(centres)))
+def _block_owners(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray,
+                  half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For each of cells (P, 3) the centre whose turned block holds it best, and the offset along that block's axes."""
+    _, index = cKDTree(centres).query(cells, k=min(NEAREST_BLOCKS, len(centres)))
     index = index.reshape(len(cells), -1)
     x, y, z = np.rint(centres).astype(int).T
-    turns = frame[z, y, x]
-    offset = np.einsum("pkd,pkde->pke", cells[:, None] - centres[index], turns[index])
-    nearest = np.abs(offset).max(axis=-1).argmin(axis=1)
+    offset = np.einsum("pkd,pkde->pke", cells[:, None] - centres[index], frame[z, y, x][index])
+    nearest = np.abs(offset / half).max(axis=-1).argmin(axis=1)
     rows = np.arange(len(cells))
     return index[rows, nearest], offset[rows, nearest].astype(np.float32)
+
+
+def empty_blocks(H: np.ndarray, frame: np.ndarray, legs: np.ndarray, edges: tuple[int, int, int],
+                 mean: float) -> Iterator[tuple[tuple[slice, ...], np.ndarray]]:
+    """The places where H (Z, Y, X, 3) has run empty, one after the other: the caller fills each before the next.
+
+    A place is as large as a block of `edges` along `legs` (3, 3), the rows in local coordinates; it is empty where the
+    mean square of H over it is below EMPTY of `mean`. Yields the box of cells round the block and their offsets from
+    its middle in its local frame (z, y, x, 3).
+    """
+    shape = np.array(H.shape[:3])
+    stride = max(1, min(edges) // 8)
+    spread = np.cbrt(np.prod(edges)) / stride / np.sqrt(2 * np.pi)
+    reach = int(np.ceil(np.linalg.norm(edges) / 2))
+    for _ in range(max(1, int(np.prod(shape) / np.prod(edges)))):
+        energy = ndimage.gaussian_filter(_thinned(np.sum(H**2, axis=-1), stride), spread, mode="reflect")
+        place = np.unravel_index(int(energy.argmin()), energy.shape)
+        if energy[place] >= EMPTY * mean:
+            return
+        middle = np.minimum(np.array(place) * stride + stride // 2, shape - 1)
+        low, high = np.maximum(middle - reach, 0), np.minimum(middle + reach + 1, shape)
+        ways = [np.arange(a, b, dtype=np.float32) - m for a, b, m in zip(low, high, middle, strict=True)]
+        way = np.stack(np.meshgrid(*ways, indexing="ij")[::-1], axis=-1)
+        yield tuple(slice(a, b) for a, b in zip(low, high, strict=True)), way @ frame[tuple(middle)]
+
+
+def _thinned(values: np.ndarray, stride: int) -> np.ndarray:
+    """Means of values (Z, Y, X) over cubes of `stride` cells; the last of an axis may be cut short."""
+    for axis in range(3):
+        starts = np.arange(0, values.shape[axis], stride)
+        counts = np.diff(np.append(starts, values.shape[axis])).astype(np.float32)
+        sums = np.add.reduceat(values, starts, axis=axis, dtype=np.float32)
+        values = sums / counts.reshape([-1 if a == axis else 1 for a in range(3)])
+    return values

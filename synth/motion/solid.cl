@@ -34,7 +34,7 @@ inline float4 trilinear(__global const float4 *field, int4 size, float4 at) {
 // field of `size`; legs (S, 3); sites first … -> out (count, SIDE, SIDE, 2), of a volume (count, SIDE, SIDE, SIDE, 3):
 // what the view sees round each site, projected on its right and up (§3.2, Project)
 __kernel void gather(__global const float4 *field, int4 size, __global const float4 *legs, int4 grid, int first,
-                     float4 right, float4 up, __global float *out) {
+                     float4 right, float4 up, float slab, __global float *out) {
     const int s = first + get_global_id(0);
     const float4 centre = site(s, grid), a = legs[3 * s], b = legs[3 * s + 1];
 #if VOLUME
@@ -45,10 +45,15 @@ __kernel void gather(__global const float4 *field, int4 size, __global const flo
             for (int i = -RADIUS; i <= RADIUS; i++, out += 3)
                 vstore3(trilinear(field, size, centre + i * a + j * b + k * c).xyz, 0, out);
 #else
+    // a slab deeper than the sites are apart is seen as a whole, the mean of three planes
+    const float4 away = slab > SPACING ? 0.5f * slab * legs[3 * s + 2] : (float4)(0.0f);
     out += get_global_id(0) * SIDE * SIDE * 2;
     for (int j = -RADIUS; j <= RADIUS; j++)
         for (int i = -RADIUS; i <= RADIUS; i++, out += 2) {
-            const float4 v = trilinear(field, size, centre + i * a + j * b);
+            const float4 at = centre + i * a + j * b;
+            float4 v = trilinear(field, size, at);
+            if (slab > SPACING)
+                v = (v + trilinear(field, size, at + away) + trilinear(field, size, at - away)) / 3.0f;
             out[0] = dot(v, right);
             out[1] = dot(v, up);
         }
@@ -132,10 +137,9 @@ __kernel void coherent_solid(__global const float *points, __global const int *s
 #define FROM(i, n) clamp((i - FIRST) / SPACING, 0, n - 1)
 #define TO(i, n) min(FROM(i, n) + 1, n - 1)
 #else
-// no match reaches further: the corner of its foot, half a slab from its plane
-#define REACH ((int)ceil(sqrt(2.0f * FOOT * FOOT + SPACING * SPACING)))
-#define FROM(i, n) (max(0, i - REACH - FIRST + SPACING - 1) / SPACING)
-#define TO(i, n) min(n - 1, (i + REACH - FIRST) / SPACING)
+// no match reaches further than `reach`: the corner of its foot, half a slab from its plane
+#define FROM(i, n) (max(0, i - reach - FIRST + SPACING - 1) / SPACING)
+#define TO(i, n) min(n - 1, (i + reach - FIRST) / SPACING)
 #endif
 
 #define EACH_SITE(body)                                                              \
@@ -151,8 +155,8 @@ __kernel void coherent_solid(__global const float *points, __global const int *s
             }
 
 // How much a match counts at offset o from its centre: most there, less towards the edges of its foot. A picture's
-// reaches one spacing to the front and to the back, where the next plane of sites has taken over.
-inline float falloff(float4 o) {
+// reaches `slab` to the front and to the back: one spacing at least, where the next plane of sites has taken over.
+inline float falloff(float4 o, float slab) {
     const float4 away = fabs(o), edge = (float4)(FOOT + 1.0f);
 #if VOLUME
     const float4 share = 1.0f - away * away / (edge * edge);
@@ -160,7 +164,7 @@ inline float falloff(float4 o) {
     const bool covered = max(max(away.x, away.y), away.z) <= FOOT + 0.001f;
 #else
     const float4 share = 1.0f - away * away / (edge * edge);
-    const float depth = 1.0f - away.z / SPACING;
+    const float depth = 1.0f - away.z / slab;
     const bool covered = max(away.x, away.y) <= FOOT + 0.001f && depth > 0.0f;
 #endif
 #if SEEN
@@ -174,14 +178,15 @@ inline float falloff(float4 o) {
 // (, normal) makes of the voxel. Where no match reaches, the view says what stands there already.
 __kernel void average(__global const texel *exemplar, int4 exemplar_size, __global const place *position,
                       __global const float *weight, __global const float4 *legs, int4 grid, float4 right, float4 up,
-                      float4 m0, float4 m1, float4 m2, int begin, __global const float4 *field,
+                      float4 m0, float4 m1, float4 m2, float slab, int begin, __global const float4 *field,
                       __global float4 *out) {
     const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
     const int here = (z * get_global_size(1) + y) * get_global_size(0) + x;
+    const int reach = (int)ceil(sqrt(2.0f * FOOT * FOOT + slab * slab));
     spread sum = (spread)(0.0f);
     float total = 0.0f;
     EACH_SITE({
-        const float w = falloff(o) * weight[s];
+        const float w = falloff(o, slab) * weight[s];
         if (w > 0.0f) {
             sum += w * SHOWN(position[s], o);
             total += w;
@@ -197,6 +202,7 @@ __kernel void average(__global const texel *exemplar, int4 exemplar_size, __glob
     out[here] = begin ? said : out[here] + said;
 }
 
+#if SEEN
 // Pseudocode 2, Assign: of the matches round a cell the one most similar to the average of all views.
 __kernel void nearest(__global const texel *exemplar, int4 exemplar_size, __global const place *position,
                       __global const float4 *legs, int4 grid, float4 right, float4 up, float4 m0, float4 m1,
@@ -222,6 +228,8 @@ __kernel void nearest(__global const texel *exemplar, int4 exemplar_size, __glob
     const float4 said = m0 * best.x + m1 * best.y + m2 * best.z;
     out[here] = begin ? said : out[here] + said;
 }
+
+#endif
 
 // The O(x) of Eq. 1: x held to the frame before, warped, by `coherence` (Z, Y, X).
 __kernel void hold(__global float4 *x, __global const float4 *prior, __global const float *coherence) {

@@ -33,6 +33,8 @@ MARGIN = 4
 STARTS = 4
 # sites compared together: their neighbourhoods are what takes most memory
 SITES_AT_ONCE = 49152
+# how much deeper than wide a block is that a dominating view sees: a motif goes on behind itself
+DEEPER = 4
 # the numbers in all neighbourhoods of a volume that is an exemplar, at most: they are held together once
 MOST_NUMBERS = 2**28
 # unit vectors closer than this to a plane lie in it
@@ -154,6 +156,15 @@ class Eye:
     matrix: np.ndarray
     width: int
     settings: Settings
+    dominant: bool
+
+    @property
+    def slab(self) -> np.float32:
+        """How far a match reaches to the front and to the back of its plane, cells.
+
+        Where one view dominates nothing else would hold its motifs together across its planes.
+        """
+        return np.float32(self.width // 2 if self.dominant else neighborhood.spacing(self.width))
 
     @cached_property
     def matcher(self) -> Matcher:
@@ -169,7 +180,7 @@ class Eye:
     @cached_property
     def _defines(self) -> dict[str, Any]:
         step = neighborhood.spacing(self.width)
-        return {"VOLUME": self.view.dimension - 2, "RADIUS": self.width // 2, "FOOT": self.width // 2, "SPACING": step,
+        return {"VOLUME": self.view.dimension - 2, "RADIUS": self.width // 2, "FOOT": step, "SPACING": step,
                 "FIRST": step // 2, "BORDER": self._border, "DIMS": self.matcher.space.dims,
                 "BLOCK": QUERIES_TOGETHER, "BOX": BOX, "CANDIDATES": self.settings.k, "DAMPING": f"{DAMPING}f"}
 
@@ -178,8 +189,9 @@ class Eye:
 
     @property
     def _border(self) -> int:
-        # a match's offset reaches the corner of its foot, its position half a cell beyond; Catmull-Rom two more
-        return int(np.ceil(np.sqrt(2) * self.width)) + 3
+        # a match's offset reaches the corner of its foot or of the eight sites' cube, its position half a cell beyond;
+        # Catmull-Rom two more
+        return int(np.ceil(np.sqrt(3) * neighborhood.spacing(self.width))) + 4
 
     @cached_property
     def _continued(self) -> tuple[Any, np.ndarray]:
@@ -221,7 +233,8 @@ class Eye:
             some = min(SITES_AT_ONCE, count - first)
             rows = -(-some // neighborhood.SITES_TOGETHER) * neighborhood.SITES_TOGETHER
             patches = opencl.empty((rows, space.length))
-            program.gather((some,), (1,), field, size, legs, cells, np.int32(first), *self._basis[:2], patches)
+            program.gather((some,), (1,), field, size, legs, cells, np.int32(first), *self._basis[:2], self.slab,
+                           patches)
             queries = space.compare(patches, some)
             if match is None:
                 best[first:first + some], distance[first:first + some] = self.matcher.exact(queries)
@@ -242,7 +255,7 @@ class Eye:
         """Eq. 2: adds to `out` (Z, Y, X, 4) what this view says; `begin`: the first to do so."""
         self._program(eight).average(
             field.shape[2::-1], None, *self._continued, position, weight, legs, np.array([*grid[::-1], 1], np.int32),
-            *self._basis, np.int32(begin), field, out)
+            *self._basis, self.slab, np.int32(begin), field, out)
 
     def nearest(self, position: Any, legs: Any, grid: tuple[int, ...], average: Any, out: Any, begin: bool) -> None:
         """Pseudocode 2, Assign: adds to `out` the match, as this view sees it, that is nearest to the average."""
@@ -274,6 +287,11 @@ class Level:
 
     eyes: dict[int, list[Eye]]
     settings: Settings
+
+    @property
+    def any_eyes(self) -> list[Eye]:
+        """The eyes of one width, for what does not depend on it."""
+        return next(iter(self.eyes.values()))
 
     def optimize(self, H: np.ndarray, frame: np.ndarray, iterations: int,
                  coherence: np.ndarray | None = None) -> tuple[np.ndarray, float]:
@@ -346,14 +364,15 @@ class Synthesis:
 
     def __init__(self, views: Sequence[View], shape: tuple[int, int, int], settings: Settings, seed: int):
         matrices = contributions(views)
+        total = sum(view.weight for view in views)
         self.views, self.shape, self.settings, self.seed = list(views), shape, settings, seed
         pyramids = [pyramid.pyramid(v.exemplar, settings.levels, toroidal=True, dimension=v.dimension) for v in views]
-        self.levels = [Level({width: [Eye(view, stages[i], matrix, width, settings) for view, stages, matrix in
-                                      zip(views, pyramids, matrices, strict=True)] for width in settings.neighborhoods},
-                             settings) for i in range(settings.levels)]
+        self.levels = [Level({width: [Eye(view, stages[i], matrix, width, settings, 2 * view.weight > total)
+                                      for view, stages, matrix in zip(views, pyramids, matrices, strict=True)]
+                              for width in settings.neighborhoods}, settings) for i in range(settings.levels)]
         # what a synthesized H has where it is as lively as the exemplars: in each level, for whether it runs empty
         self.mean_squares = [sum(float(np.mean(np.sum((eye.exemplar @ eye.matrix.T.astype(np.float32)) ** 2, -1)))
-                                 for eye in next(iter(level.eyes.values()))) for level in self.levels]
+                                 for eye in level.any_eyes) for level in self.levels]
 
     def frame(self, L: np.ndarray, towards: np.ndarray, state: State | None) -> State:
         """The state after the frame with coarse motion L (Z, Y, X, 3) cells per frame; None before the first.
@@ -377,9 +396,10 @@ class Synthesis:
     def _first(self, motions: list[np.ndarray], directions: list[np.ndarray], coarsest: np.ndarray) -> list[np.ndarray]:
         """H of each level of the first frame: the coarsest from a mosaic of blocks, each other from the one before."""
         done = [self._start(coarsest)]
-        for level, motion, direction in zip(self.levels[1:], motions[1:], directions[1:], strict=True):
-            frame = solid_frame(motion, direction, self.settings.along)
-            done.append(level.optimize(_finer(done[-1], motion.shape[:3]), frame, self.settings.iterations)[0])
+        for i, level in enumerate(self.levels[1:], 1):
+            frame = solid_frame(motions[i], directions[i], self.settings.along)
+            H = self._sown(i, _finer(done[-1], motions[i].shape[:3]), frame)
+            done.append(level.optimize(H, frame, self.settings.iterations)[0])
         return done
 
     def _next(self, motions: list[np.ndarray], directions: list[np.ndarray], coarsest: np.ndarray,
@@ -400,36 +420,57 @@ class Synthesis:
                 frame = solid_frame(motions[i], directions[i], self.settings.along)
             else:
                 frame = coarsest
-            done.append(level.optimize(H, frame, self.settings.few, held)[0])
+            done.append(level.optimize(self._sown(i, H, frame), frame, self.settings.few, held)[0])
             warped_before = warped
         return done
 
     def _start(self, frame: np.ndarray) -> np.ndarray:
         """The coarsest level of the first frame: of several mosaics the one that promises most, optimized."""
         level = self.levels[0]
-        eyes = level.eyes[self.settings.neighborhoods[0]]
         best, least = None, np.inf
         for start in range(STARTS):
             random = np.random.Generator(np.random.Philox(key=[self.seed, start]))
-            H, distance = level.optimize(self._mosaic(eyes, frame, random), frame, self.settings.few)
+            H, distance = level.optimize(self._mosaic(level, frame, random), frame, self.settings.few)
             inside = H[(slice(MARGIN, -MARGIN),) * 3]
             # the distance alone would choose the emptiest
             score = distance + abs(float(np.sqrt(np.mean(np.sum(inside**2, -1)) / self.mean_squares[0])) - 1)
             if score < least:
                 best, least = H, score
         assert best is not None
-        return level.optimize(best, frame, self.settings.iterations)[0]
+        return level.optimize(self._sown(0, best, frame), frame, self.settings.iterations)[0]
 
-    def _mosaic(self, eyes: list[Eye], frame: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    def _mosaic(self, level: Level, frame: np.ndarray, random: np.random.Generator) -> np.ndarray:
         """Blocks as large as the exemplar that weighs most, each with a whole motif for every view: (Z, Y, X, 3)."""
-        weighty = max(eyes, key=lambda eye: eye.view.weight)
-        offset = initialize.blocks(frame, weighty.exemplar.shape[0], random)
-        H = np.zeros((*frame.shape[:3], 3), np.float32)
-        for eye in eyes:
+        legs, edges = self._block(level)
+        return self._motif(level, initialize.blocks(frame @ legs.T, edges, random) @ legs)
+
+    def _block(self, level: Level) -> tuple[np.ndarray, tuple[int, int, int]]:
+        """Of the view that weighs most: its legs (3, 3), and the edges of a block along them, cells of the level."""
+        weighty = max(level.any_eyes, key=lambda eye: eye.view.weight)
+        edge = weighty.exemplar.shape[0]
+        return weighty.view.legs.astype(np.float32), (edge, edge, edge * (DEEPER if weighty.dominant else 1))
+
+    def _motif(self, level: Level, offset: np.ndarray) -> np.ndarray:
+        """What all views together show at offsets (..., 3) in local coordinates from the middle of their exemplars."""
+        H = np.zeros(offset.shape, np.float32)
+        for eye in level.any_eyes:
             size = np.array(eye.exemplar.shape[-2::-1])
             seen = offset @ eye.view.projection.T.astype(np.float32)
             at = np.rint(seen + (size - 1) / 2).astype(int) % size
             H += eye.exemplar[tuple(np.moveaxis(at, -1, 0)[::-1])] @ eye.matrix.T.astype(np.float32)
+        return H
+
+    def _sown(self, number: int, H: np.ndarray, frame: np.ndarray) -> np.ndarray:
+        """H (Z, Y, X, 3) of a level with a whole motif laid into each place that has run empty, as `reseed` does."""
+        level = self.levels[number]
+        legs, edges = self._block(level)
+        H = H.copy()
+        for box, offset in initialize.empty_blocks(H, frame, legs, edges, self.mean_squares[number]):
+            inside = (np.abs(offset @ legs.T) < np.array(edges) / 2).all(-1)
+            motif, there = self._motif(level, offset), H[box]
+            # what stands at the edge of the place stays whole
+            stronger = inside & (np.sum(motif**2, -1) > np.sum(there**2, -1))
+            there[stronger] = motif[stronger]
         return H
 
 
