@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from synth import opencl
+from synth.advect import departure
 from synth.motion import exemplar, solid
 
 FRONT, SIDE, TOP = ((1, 0, 0), (0, 1, 0)), ((0, 0, 1), (0, 1, 0)), ((1, 0, 0), (0, 0, 1))
@@ -94,3 +96,175 @@ def test_the_same_seed_gives_the_same_bits(search):
     once, again = (first(ways, (7, 9, 10), search=search)[2] for _ in range(2))
     np.testing.assert_array_equal(once, again)
     assert once.shape == (7, 9, 10, 3) and np.isfinite(once).all()
+
+
+def rotations(count, seed=3):
+    """Random rotations (count, 3, 3) float32."""
+    random = np.random.default_rng(seed)
+    found, _ = np.linalg.qr(random.normal(size=(count, 3, 3)))
+    found[np.linalg.det(found) < 0, :, 0] *= -1
+    return found.astype(np.float32)
+
+
+class Bench:
+    """One eye over a field whose every site has a frame of its own."""
+
+    def __init__(self, dimension, shape, dominant, width=5):
+        random = np.random.default_rng(7)
+        size = (6, 7) if dimension == 2 else (3, 4, 5)
+        I = random.normal(size=(*size, dimension)).astype(np.float32)
+        view = solid.View(I, (1, 2, 0), (0, 1, 1), 1.5)
+        matrix = random.normal(size=(3, dimension))
+        self.eye = solid.Eye(view, I, matrix, width, solid.Settings(1, (width,)), dominant)
+        self.field = random.normal(size=(*shape, 3)).astype(np.float32)
+        slices = solid.site_grid(shape, width)
+        cells = np.stack(np.meshgrid(*(np.arange(n)[s] for n, s in zip(shape, slices, strict=True)), indexing="ij"), -1)
+        self.grid = cells.shape[:3]
+        self.sites = cells.reshape(-1, 3)[:, ::-1]
+        frames = rotations(len(self.sites)).reshape(*self.grid, 3, 3)
+        self.legs = self.eye.legs(frames)
+        self.on_host = self.legs.get()[..., :3].astype(np.float64)
+        self.position = (random.random((len(self.sites), 2 * dimension - 2)) * 9 - 1).astype(np.float32)[:, :4]
+        if dimension == 3:
+            self.position[:, 3] = 0
+        self.weight = random.random(len(self.sites)).astype(np.float32)
+
+
+BENCHES = pytest.mark.parametrize("dimension, dominant", [(2, False), (2, True), (3, False)])
+SHAPES = pytest.mark.parametrize("shape", [(5, 7, 3), (2, 2, 2), (4, 3, 9)])
+
+
+@BENCHES
+@SHAPES
+def test_gather_and_search_equal_their_references(shape, dimension, dominant):
+    b = Bench(dimension, shape, dominant)
+    match, position, distance = b.eye.search(solid._four(b.field), b.legs, b.grid, None)
+    seen = solid.gather_reference(b.field, b.sites, b.on_host, b.eye.view, 2, float(b.eye.slab), 1)
+    space = b.eye.matcher.space
+    queries = (seen - space.mean) @ space.basis
+    squared = ((queries[:, None] - space.points) ** 2).sum(-1)
+    np.testing.assert_allclose(distance.get(), squared.min(1), rtol=1e-3, atol=1e-3)
+    chosen = squared[np.arange(len(b.sites)), match.get()]
+    np.testing.assert_allclose(chosen, squared.min(1), rtol=1e-3, atol=1e-3)
+    if dimension == 2:  # not further than half a cell along each axis from the cell that matched
+        columns = b.eye.exemplar.shape[1]
+        cell = np.stack([match.get() % columns, match.get() // columns], -1)
+        assert np.abs(position.get() - cell).max() <= 0.5
+    # and from there by k-coherence
+    found, _, distance = b.eye.search(solid._four(b.field), b.legs, b.grid, match)
+    best, least = solid.coherent_reference(space.points, b.eye.matcher.similar.get(), b.eye.exemplar.shape[:-1],
+                                           queries.astype(np.float32), b.sites, b.on_host, b.grid, match.get())
+    np.testing.assert_allclose(distance.get(), least, rtol=1e-3, atol=1e-3)
+    assert (found.get() == best).mean() > 0.95  # equal but for ties to rounding
+
+
+@BENCHES
+@SHAPES
+@pytest.mark.parametrize("eight", [True, False])
+def test_average_equals_its_reference(shape, dimension, dominant, eight):
+    b = Bench(dimension, shape, dominant)
+    out = opencl.empty((*shape, 4))
+    b.eye.average(opencl.to_device(b.position), opencl.to_device(b.weight), b.legs, b.grid, solid._four(b.field), out,
+                  eight, True)
+    expected = solid.average_reference(b.eye, b.position, b.weight, b.sites, b.on_host, b.field, eight)
+    np.testing.assert_allclose(out.get()[..., :3], expected, atol=2e-4)
+    # a second view adds to what the first said
+    b.eye.average(opencl.to_device(b.position), opencl.to_device(b.weight), b.legs, b.grid, solid._four(b.field), out,
+                  eight, False)
+    np.testing.assert_allclose(out.get()[..., :3], 2 * expected, atol=4e-4)
+
+
+@BENCHES
+@SHAPES
+def test_nearest_equals_its_reference(shape, dimension, dominant):
+    b = Bench(dimension, shape, dominant)
+    out = opencl.empty((*shape, 4))
+    b.eye.nearest(opencl.to_device(b.position), b.legs, b.grid, solid._four(b.field), out, True)
+    expected = solid.nearest_reference(b.eye, b.position, b.sites, b.on_host, b.field)
+    np.testing.assert_allclose(out.get()[..., :3], expected, atol=2e-4)
+
+
+@SHAPES
+def test_carry_equals_its_reference_and_moves_by_whole_cells_exactly(shape):
+    random = np.random.default_rng(2)
+    H = random.normal(size=(*shape, 3)).astype(np.float32)
+    motion = (2 * random.normal(size=(*shape, 3))).astype(np.float32)
+    np.testing.assert_allclose(solid.carry(H, motion), solid.carry_reference(H, departure(motion)), atol=1e-5)
+    np.testing.assert_array_equal(solid.carry(H, np.zeros_like(motion)), H)
+    along_x = np.zeros_like(motion)
+    along_x[..., 0] = 1
+    np.testing.assert_array_equal(solid.carry(H, along_x)[:, :, 1:], H[:, :, :-1])
+
+
+def test_a_rigid_flow_does_not_deform():
+    # a rotation about y carries the detail and turns the frame with it
+    turn = 0.01
+    z, _, x = np.meshgrid(*[np.arange(9, dtype=np.float32) - 4] * 3, indexing="ij")
+    way = np.stack([-turn * z, np.zeros_like(z), turn * x], -1)
+    before = np.broadcast_to(np.eye(3, dtype=np.float32), (9, 9, 9, 3, 3))
+    c, s = np.cos(turn), np.sin(turn)
+    after = np.broadcast_to(np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]], np.float32), before.shape)
+    assert solid.deformation(way, before, after).max() < 1e-3
+    assert solid.deformation(way, before, before).min() == pytest.approx(np.sqrt(2) * turn, rel=0.05)
+    shear = np.stack([0.1 * z, 0 * z, 0 * z], -1)
+    np.testing.assert_allclose(solid.deformation(shear, before, before), 0.1, rtol=1e-4)
+
+
+def test_a_volume_is_synthesized_from_a_volume():
+    # 3D to 3D: one view that sees everything
+    z, y, x = np.meshgrid(*[2 * np.pi * np.arange(8) / 8] * 3, indexing="ij")
+    I = np.stack([np.cos(y), np.cos(z), np.cos(x)], -1).astype(np.float32)
+    _, _, H = first([solid.View(I)], (9, 8, 10), search="exact")
+    assert np.sqrt(np.mean(H**2)) == pytest.approx(np.sqrt(np.mean(I**2)), rel=0.2)
+    quarter = np.sqrt(np.mean((np.diff(H, axis=2)) ** 2, axis=(0, 1, 2)))
+    expected = np.sqrt(np.mean((np.diff(I, axis=2, append=I[:, :, :1])) ** 2, axis=(0, 1, 2)))
+    np.testing.assert_allclose(quarter, expected, atol=0.2)
+
+
+def test_a_volume_too_large_for_an_exemplar_is_refused():
+    with pytest.raises(ValueError, match="too large an exemplar"):
+        solid.exemplar_blocks(np.ones((64, 64, 64, 3), np.float32), 4)
+
+
+def test_motifs_do_not_die_out_under_a_dominating_view():
+    I = exemplar.exemplar("heart", 16)
+    ways = views(I, FRONT, SIDE, TOP, weights=(1, 0.05, 0.05))
+    _, _, H = first(ways, (20, 40, 40), levels=2, neighborhoods=(17, 9), search="exact")
+    seen = np.sqrt(np.mean(H[..., :2] ** 2))
+    assert 0.75 < seen / np.sqrt(np.mean(I**2)) < 1.15
+
+
+def test_frames_follow_each_other_and_stay_steady_under_a_constant_flow():
+    I = exemplar.exemplar("sinusoid", 8)
+    settings = solid.Settings(levels=1, iterations=2)
+    synthesis = solid.Synthesis(views(I, FRONT, SIDE, TOP), (12, 12, 12), settings, 1)
+    L, T = flow((12, 12, 12))
+    state, changes = None, []
+    for _ in range(6):
+        after = synthesis.frame(L, T, state)
+        if state is not None:
+            warped = solid.carry(synthesis.visible(state), L)
+            change = np.linalg.norm((synthesis.visible(after) - warped)[:, :, 2:], axis=-1)
+            changes.append(np.median(change) / np.sqrt(np.mean(np.sum(warped**2, -1))))
+        state = after
+    assert changes[-1] < 0.1
+
+
+def test_the_memory_it_says_it_needs_grows_with_the_voxels():
+    I = exemplar.exemplar("sinusoid", 8)
+    ways = views(I, FRONT, SIDE, TOP)
+    small, large = (solid.memory_needed(ways, (n, n, n), solid.Settings(3)) for n in (64, 256))
+    assert 20 < large / small < 64
+    assert 1e9 < solid.memory_needed(ways, (256, 64, 256), solid.Settings(3)) < 4e9
+
+
+def test_nothing_flows_through_a_wall():
+    # a plane wall at y = 6: H along y vanishes there
+    shape = (8, 16, 8)
+    distance = np.broadcast_to((np.arange(16, dtype=np.float32) - 6)[:, None], shape)
+    I = exemplar.exemplar("sinusoid", 8)
+    settings = solid.Settings(levels=1, iterations=3)
+    synthesis = solid.Synthesis(views(I, SIDE, TOP, FRONT), shape, settings, 1, distance)
+    L, T = flow(shape)
+    H = synthesis.visible(synthesis.frame(L, T, None))  # the frame is the domain's own
+    assert np.abs(H[:, 6, :, 1]).max() < 0.02 * np.sqrt(np.mean(np.sum(H**2, -1)))

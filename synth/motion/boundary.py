@@ -98,12 +98,13 @@ class Constraint:
         at = frame.reshape(-1, *frame.shape[dimension:])[walls.cells]
         self._walls = [opencl.to_device(a) for a in (
             walls.cells, into_frame(walls.normal, at).astype(np.float32), walls.target, walls.weight)]
-        self._program = opencl.program(Path(__file__).with_suffix(".cl"), DIMENSION=dimension)
+        self._dimension = dimension
 
     def impose(self, x: Any, hold: Any) -> None:
         """Add E_n to the minimum x (*shape, D) of E_t + O(x), whose weights are 1 and hold (*shape); device arrays.
 
-        x is changed in place.
+        x is changed in place; a cell of it may have a last component that is not used.
         """
         if self._count:
-            self._program.impose((self._count,), None, *self._walls, hold, x)
+            program = opencl.program(Path(__file__).with_suffix(".cl"), DIMENSION=self._dimension, STRIDE=x.shape[-1])
+            program.impose((self._count,), None, *self._walls, hold, x)

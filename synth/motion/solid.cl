@@ -31,6 +31,13 @@ inline float4 trilinear(__global const float4 *field, int4 size, float4 at) {
     return (1.0f - t.z) * ((1.0f - t.y) * a + t.y * b) + t.z * ((1.0f - t.y) * c + t.y * d);
 }
 
+// P v: the components that the view sees (§3.2, figure 3)
+#if VOLUME
+#define PROJECTED(v) (float4)(dot(v, right), dot(v, up), dot(v, cross(right, up)), 0.0f)
+#else
+#define PROJECTED(v) (float4)(dot(v, right), dot(v, up), 0.0f, 0.0f)
+#endif
+
 // field of `size`; legs (S, 3); sites first … -> out (count, SIDE, SIDE, 2), of a volume (count, SIDE, SIDE, SIDE, 3):
 // what the view sees round each site, projected on its right and up (§3.2, Project)
 __kernel void gather(__global const float4 *field, int4 size, __global const float4 *legs, int4 grid, int first,
@@ -43,7 +50,7 @@ __kernel void gather(__global const float4 *field, int4 size, __global const flo
     for (int k = -RADIUS; k <= RADIUS; k++)
         for (int j = -RADIUS; j <= RADIUS; j++)
             for (int i = -RADIUS; i <= RADIUS; i++, out += 3)
-                vstore3(trilinear(field, size, centre + i * a + j * b + k * c).xyz, 0, out);
+                vstore3(PROJECTED(trilinear(field, size, centre + i * a + j * b + k * c)).xyz, 0, out);
 #else
     // a slab deeper than the sites are apart is seen as a whole, the mean of three planes
     const float4 away = slab > SPACING ? 0.5f * slab * legs[3 * s + 2] : (float4)(0.0f);
@@ -54,8 +61,7 @@ __kernel void gather(__global const float4 *field, int4 size, __global const flo
             float4 v = trilinear(field, size, at);
             if (slab > SPACING)
                 v = (v + trilinear(field, size, at + away) + trilinear(field, size, at - away)) / 3.0f;
-            out[0] = dot(v, right);
-            out[1] = dot(v, up);
+            vstore2(PROJECTED(v).xy, 0, out);
         }
 #endif
 }
@@ -193,11 +199,7 @@ __kernel void average(__global const texel *exemplar, int4 exemplar_size, __glob
         }
     })
     float4 mean = ADDED(sum) / total;
-#if VOLUME
-    if (total <= 0.0f) mean = field[here];
-#else
-    if (total <= 0.0f) mean = (float4)(dot(field[here], right), dot(field[here], up), 0.0f, 0.0f);
-#endif
+    if (total <= 0.0f) mean = PROJECTED(field[here]);
     const float4 said = m0 * mean.x + m1 * mean.y + m2 * mean.z;
     out[here] = begin ? said : out[here] + said;
 }
@@ -209,11 +211,7 @@ __kernel void nearest(__global const texel *exemplar, int4 exemplar_size, __glob
                       float4 m2, int begin, __global const float4 *average, __global float4 *out) {
     const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
     const int here = (z * get_global_size(1) + y) * get_global_size(0) + x;
-#if VOLUME
-    const float4 mean = average[here];
-#else
-    const float4 mean = (float4)(dot(average[here], right), dot(average[here], up), 0.0f, 0.0f);
-#endif
+    const float4 mean = PROJECTED(average[here]);
     float4 best = (float4)(0.0f);
     float least = HUGE_DISTANCE;
     EACH_SITE({

@@ -22,7 +22,8 @@ from scipy import ndimage
 from synth import opencl, pyramid
 from synth.advect import Grid
 from synth.motion import initialize, neighborhood
-from synth.motion.assignment import robust_weights
+from synth.motion.assignment import catmull_rom, robust_weights, sample_reference
+from synth.motion.boundary import Constraint, walls
 from synth.motion.detail import COHERENCE, DEFORMED
 from synth.motion.frames import solid_frame
 from synth.motion.search import BOX, DAMPING, QUERIES_TOGETHER, Matcher
@@ -293,16 +294,16 @@ class Level:
         """The eyes of one width, for what does not depend on it."""
         return next(iter(self.eyes.values()))
 
-    def optimize(self, H: np.ndarray, frame: np.ndarray, iterations: int,
-                 coherence: np.ndarray | None = None) -> tuple[np.ndarray, float]:
+    def optimize(self, H: np.ndarray, frame: np.ndarray, iterations: int, coherence: np.ndarray | None = None,
+                 boundary: Constraint | None = None) -> tuple[np.ndarray, float]:
         """Search and assign, `iterations` times with each width; H (Z, Y, X, 3), frame (Z, Y, X, 3, 3).
 
-        coherence (Z, Y, X) holds the result to H as it came. Returns H and the mean distance of the last matches over
-        the views, as a share of their exemplars' rms.
+        coherence (Z, Y, X) holds the result to H as it came; boundary is the E_n of Eq. 3. Returns
+        H and the mean distance of the last matches over the views, as a share of their exemplars' rms.
         """
         x = _four(H)
-        if coherence is not None:
-            prior, held = x.copy(), opencl.to_device(coherence)
+        prior = x
+        held = opencl.zeros(H.shape[:3]) if coherence is None else opencl.to_device(coherence)
         distance = 0.0
         for width, eyes in self.eyes.items():
             sites = frame[site_grid(H.shape[:3], width)]
@@ -312,6 +313,8 @@ class Level:
                 x, matches, distance = self._iteration(x, eyes, legs, grid, matches, left == 0)
                 if coherence is not None:
                     eyes[0].hold(x, prior, held)
+                if boundary is not None:
+                    boundary.impose(x, held)
         return np.ascontiguousarray(x.get()[..., :3]), distance
 
     def _iteration(self, x: Any, eyes: list[Eye], legs: list[Any], grid: tuple[int, ...],
@@ -358,14 +361,16 @@ class State:
 class Synthesis:
     """Synthesizes H frame by frame.
 
-    views; shape (Z, Y, X) of the output. Raises ValueError for views that do not span space or whose exemplars are of
-    different dimension than their planes.
+    views; shape (Z, Y, X) of the output; distance (Z, Y, X) to the wall of an obstacle, cells, whose boundary H is to
+    observe (§3.6). Raises ValueError for views that do not span space.
     """
 
-    def __init__(self, views: Sequence[View], shape: tuple[int, int, int], settings: Settings, seed: int):
+    def __init__(self, views: Sequence[View], shape: tuple[int, int, int], settings: Settings, seed: int,
+                 distance: np.ndarray | None = None):
         matrices = contributions(views)
         total = sum(view.weight for view in views)
-        self.views, self.shape, self.settings, self.seed = list(views), shape, settings, seed
+        self.shape, self.settings, self.seed = shape, settings, seed
+        self.walls = None if distance is None else walls(distance, settings.levels, MARGIN)
         pyramids = [pyramid.pyramid(v.exemplar, settings.levels, toroidal=True, dimension=v.dimension) for v in views]
         self.levels = [Level({width: [Eye(view, stages[i], matrix, width, settings, 2 * view.weight > total)
                                       for view, stages, matrix in zip(views, pyramids, matrices, strict=True)]
@@ -399,7 +404,7 @@ class Synthesis:
         for i, level in enumerate(self.levels[1:], 1):
             frame = solid_frame(motions[i], directions[i], self.settings.along)
             H = self._sown(i, _finer(done[-1], motions[i].shape[:3]), frame)
-            done.append(level.optimize(H, frame, self.settings.iterations)[0])
+            done.append(level.optimize(H, frame, self.settings.iterations, boundary=self._constraint(i, frame))[0])
         return done
 
     def _next(self, motions: list[np.ndarray], directions: list[np.ndarray], coarsest: np.ndarray,
@@ -420,24 +425,29 @@ class Synthesis:
                 frame = solid_frame(motions[i], directions[i], self.settings.along)
             else:
                 frame = coarsest
-            done.append(level.optimize(self._sown(i, H, frame), frame, self.settings.few, held)[0])
+            done.append(level.optimize(self._sown(i, H, frame), frame, self.settings.few, held,
+                                       self._constraint(i, frame))[0])
             warped_before = warped
         return done
 
     def _start(self, frame: np.ndarray) -> np.ndarray:
         """The coarsest level of the first frame: of several mosaics the one that promises most, optimized."""
-        level = self.levels[0]
+        level, boundary = self.levels[0], self._constraint(0, frame)
         best, least = None, np.inf
         for start in range(STARTS):
             random = np.random.Generator(np.random.Philox(key=[self.seed, start]))
-            H, distance = level.optimize(self._mosaic(level, frame, random), frame, self.settings.few)
+            H, distance = level.optimize(self._mosaic(level, frame, random), frame, self.settings.few, None, boundary)
             inside = H[(slice(MARGIN, -MARGIN),) * 3]
             # the distance alone would choose the emptiest
             score = distance + abs(float(np.sqrt(np.mean(np.sum(inside**2, -1)) / self.mean_squares[0])) - 1)
             if score < least:
                 best, least = H, score
         assert best is not None
-        return level.optimize(self._sown(0, best, frame), frame, self.settings.iterations)[0]
+        return level.optimize(self._sown(0, best, frame), frame, self.settings.iterations, None, boundary)[0]
+
+    def _constraint(self, level: int, frame: np.ndarray) -> Constraint | None:
+        """E_n on a level in a frame with these local frames; None where there is no wall."""
+        return None if self.walls is None else Constraint(self.walls[level], frame)
 
     def _mosaic(self, level: Level, frame: np.ndarray, random: np.random.Generator) -> np.ndarray:
         """Blocks as large as the exemplar that weighs most, each with a whole motif for every view: (Z, Y, X, 3)."""
@@ -535,3 +545,127 @@ def memory_needed(views: Sequence[View], shape: tuple[int, int, int], settings: 
     exemplars = sum(4.0 * v.exemplar.size // v.dimension * (64 * 2 + (2 * 4 + 1) ** v.dimension * v.dimension * 3)
                     for v in views)
     return int(cells * 8 / 7 * per_cell + sites * per_site + exemplars + SITES_AT_ONCE * 4 * 800)
+
+
+# The specification of the kernels, in NumPy. Sites are given by their cells (S, 3) as x, y, z; legs are (S, 3, 3).
+
+
+def gather_reference(field: np.ndarray, sites: np.ndarray, legs: np.ndarray, view: View, radius: int,
+                     slab: float, spacing: int) -> np.ndarray:
+    """Specification of `gather`: field (Z, Y, X, 3) as the view sees it round each site, (S, C) float32."""
+    span = np.arange(-radius, radius + 1)
+    ways = np.stack(np.meshgrid(*[span] * view.dimension, indexing="ij")[::-1], -1).reshape(-1, view.dimension)
+    at = sites[:, None] + np.einsum("pl,sld->spd", ways, legs[:, : view.dimension])
+    planes = [0.0]
+    if view.dimension == 2 and slab > spacing:
+        planes = [0.0, 0.5 * slab, -0.5 * slab]
+    seen = sum(_sampled(field, at + plane * legs[:, None, 2]) for plane in planes) / len(planes)
+    return (seen @ view.projection.T).reshape(len(sites), -1).astype(np.float32)
+
+
+def _sampled(field: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """field (Z, Y, X, 3) at points (..., 3) as x, y, z: linear, clamped."""
+    where = np.moveaxis(np.clip(at, 0, np.array(field.shape[2::-1]) - 1), -1, 0)[::-1]
+    return np.stack([ndimage.map_coordinates(field[..., c], where, order=1) for c in range(3)], -1)
+
+
+def coherent_reference(points: np.ndarray, similar: np.ndarray, exemplar: tuple[int, ...], queries: np.ndarray,
+                       sites: np.ndarray, legs: np.ndarray, grid: tuple[int, int, int],
+                       match: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Specification of `coherent_solid`; exemplar (rows, columns) or (layers, rows, columns), grid (K, J, I)."""
+    best, distance = np.zeros(len(sites), int), np.zeros(len(sites))
+    for s in range(len(sites)):
+        here = np.array(np.unravel_index(s, grid))
+        candidates: set[int] = set()
+        for step in np.concatenate([np.zeros((1, 3), int), np.eye(3, dtype=int), -np.eye(3, dtype=int)]):
+            there = here + step
+            if (there < 0).any() or (there >= grid).any():
+                continue
+            n = int(np.ravel_multi_index(tuple(there), grid))
+            way = np.rint(legs[s] @ (sites[s] - sites[n]))[: len(exemplar)].astype(int)
+            cell = (np.array(np.unravel_index(int(match[n]), exemplar)) + way[::-1]) % exemplar
+            candidates.update(similar[np.ravel_multi_index(tuple(cell), exemplar)].tolist())
+        choice = np.array(sorted(candidates))
+        squared = ((queries[s] - points[choice]).astype(np.float64) ** 2).sum(1)
+        best[s], distance[s] = choice[squared.argmin()], squared.min()
+    return best, distance
+
+
+def shown_reference(exemplar: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """What an exemplar holds at points (P, 2 or 3), toroidal: Catmull-Rom of a picture, linear of a volume."""
+    if exemplar.ndim == 3:
+        return sample_reference(exemplar, at[:, :2], toroidal=True)
+    return np.stack([ndimage.map_coordinates(exemplar[..., c], at.T[::-1], order=1, mode="grid-wrap")
+                     for c in range(3)], -1)
+
+
+def average_reference(eye: Eye, position: np.ndarray, weight: np.ndarray, sites: np.ndarray, legs: np.ndarray,
+                      field: np.ndarray, eight: bool) -> np.ndarray:
+    """Specification of `average`: what one view makes of each voxel (Z, Y, X, 3), site by site."""
+    step = neighborhood.spacing(eye.width)
+    sums, totals = np.zeros((*field.shape[:3], eye.view.dimension)), np.zeros(field.shape[:3])
+    for s, (way, o) in enumerate(_offsets(sites, legs, field.shape[:3])):
+        share = 1 - o**2 / (step + 1) ** 2
+        volume = eye.view.dimension == 3
+        depth = share[..., 2] if volume else 1 - np.abs(o[..., 2]) / float(eye.slab)
+        if eight:
+            w = np.maximum(share[..., 0], 0.1) * np.maximum(share[..., 1], 0.1) * np.maximum(depth, 0.1)
+            w *= _among_eight(way, sites[s], sites, step)
+        else:
+            w = share[..., 0] * share[..., 1] * depth
+            w *= (np.abs(o[..., : 3 if volume else 2]).max(-1) <= step + 0.001) & (depth > 0)
+        w = w * weight[s]
+        at = position[s, : eye.view.dimension] + o[..., : eye.view.dimension]
+        shown = shown_reference(eye.exemplar, at.reshape(-1, eye.view.dimension)).reshape(sums.shape)
+        sums += w[..., None] * shown
+        totals += w
+    there = field @ eye.view.projection.T
+    mean = np.where(totals[..., None] > 0, sums / np.maximum(totals, 1e-30)[..., None], there)
+    return (mean @ eye.matrix.T).astype(np.float32)
+
+
+def nearest_reference(eye: Eye, position: np.ndarray, sites: np.ndarray, legs: np.ndarray,
+                      average: np.ndarray) -> np.ndarray:
+    """Specification of `nearest`: of the eight matches round a voxel the one most similar to the average there."""
+    step, dimension = neighborhood.spacing(eye.width), eye.view.dimension
+    mean = average @ eye.view.projection.T
+    best, least = np.zeros_like(mean), np.full(average.shape[:3], np.inf)
+    for s, (way, o) in enumerate(_offsets(sites, legs, average.shape[:3])):
+        at = position[s, :dimension] + o[..., :dimension]
+        shown = shown_reference(eye.exemplar, at.reshape(-1, dimension)).reshape(mean.shape)
+        d = np.where(_among_eight(way, sites[s], sites, step), np.sum((shown - mean) ** 2, -1), np.inf)
+        best = np.where((d < least)[..., None], shown, best)
+        least = np.minimum(d, least)
+    return (best @ eye.matrix.T).astype(np.float32)
+
+
+def _offsets(sites: np.ndarray, legs: np.ndarray,
+             shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """For each site the way (Z, Y, X, 3) from it to every cell, and the same along its legs."""
+    cells = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")[::-1], -1)
+    for site, leg in zip(sites, legs, strict=True):
+        yield cells - site, (cells - site) @ leg.T
+
+
+def _among_eight(way: np.ndarray, site: np.ndarray, sites: np.ndarray, step: int) -> np.ndarray:
+    """Which cells (Z, Y, X) have this site at a corner of the cube of sites that holds them, or lie beyond the last."""
+    first, last = sites.min(0), sites.max(0)
+    near = np.abs(way) < step
+    beyond = ((site == first) & (way <= 0)) | ((site == last) & (way >= 0))
+    # a cell on a plane of sites looks forward too
+    behind = (way == -step) & (site > first)
+    return np.all(near | beyond | behind, axis=-1)
+
+
+def carry_reference(H: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+    """Specification of `carry_solid`: H (Z, Y, X, 3) at each cell + displacement (Z, Y, X, 3), Catmull-Rom, clamped."""
+    cells = np.stack(np.meshgrid(*(np.arange(n) for n in H.shape[:3]), indexing="ij")[::-1], -1)
+    last = np.array(H.shape[2::-1], np.float32) - 1
+    at = np.clip(cells + displacement, 0, last).astype(np.float32)
+    low = np.floor(at).astype(int)
+    weights = catmull_rom(at - low)
+    out = np.zeros(H.shape)
+    for i, j, k in np.ndindex(4, 4, 4):
+        x, y, z = (np.clip(low[..., c] + (i, j, k)[c] - 1, 0, H.shape[2 - c] - 1) for c in range(3))
+        out += (weights[..., 0, i] * weights[..., 1, j] * weights[..., 2, k])[..., None] * H[z, y, x]
+    return out.astype(np.float32)
