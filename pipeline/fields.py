@@ -202,7 +202,8 @@ def _solid_synthesis(scene: Scene, stock: Stock) -> tuple[Any, type]:
     from synth.motion import solid
 
     views = solid_views(scene, {name: stock.read(name).values for name in scene.exemplars})
-    return solid.Synthesis(views, _solid_shape(scene), solid_settings(scene), scene.seed), solid.State
+    distance = obstacles.distance(scene, stock) if scene.detail.boundary else None
+    return solid.Synthesis(views, _solid_shape(scene), solid_settings(scene), scene.seed, distance), solid.State
 
 
 def solid_views(scene: Scene, values: dict[str, np.ndarray]) -> list[Any]:

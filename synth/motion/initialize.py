@@ -14,7 +14,6 @@ from synth import opencl
 RELAXATIONS = 15
 # tiles laid per exemplar area: squares that turn do not pack without gaps, and some tiles die out
 CROWDING = 1.1
-NEAREST = 8
 # deep blocks have many beside them
 NEAREST_BLOCKS = 16
 # a place with less than this share of the exemplar's mean square is empty; a lattice of points has 0.83 at least

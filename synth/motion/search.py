@@ -72,6 +72,11 @@ def refine_reference(points: np.ndarray, exemplar: tuple[int, int], queries: np.
     return (np.stack([x, y], axis=-1) + np.clip(shift, -0.5, 0.5)).astype(np.float32)
 
 
+def defines(dims: int, candidates: int) -> dict[str, Any]:
+    """What search.cl is built with."""
+    return {"DIMS": dims, "BLOCK": QUERIES_TOGETHER, "CANDIDATES": candidates, "BOX": BOX, "DAMPING": f"{DAMPING}f"}
+
+
 @dataclass(frozen=True)
 class Matcher:
     """Searches the space of an exemplar of size `exemplar` (rows, columns) on the device."""
@@ -82,8 +87,7 @@ class Matcher:
 
     @cached_property
     def _program(self) -> Any:
-        return opencl.program(Path(__file__).with_suffix(".cl"), DIMS=self.space.dims, BLOCK=QUERIES_TOGETHER,
-                              CANDIDATES=self.candidates, BOX=BOX, DAMPING=f"{DAMPING}f")
+        return opencl.program(Path(__file__).with_suffix(".cl"), **defines(self.space.dims, self.candidates))
 
     @cached_property
     def points(self) -> Any:

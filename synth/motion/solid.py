@@ -21,12 +21,12 @@ from scipy import ndimage
 
 from synth import opencl, pyramid
 from synth.advect import Grid
-from synth.motion import initialize, neighborhood
+from synth.motion import initialize, neighborhood, search
 from synth.motion.assignment import catmull_rom, robust_weights, sample_reference
 from synth.motion.boundary import Constraint, walls
 from synth.motion.detail import COHERENCE, DEFORMED
 from synth.motion.frames import solid_frame
-from synth.motion.search import BOX, DAMPING, QUERIES_TOGETHER, Matcher
+from synth.motion.search import Matcher
 
 # each level is synthesized on the domain grown by the radius of a neighbourhood, as in the plane
 MARGIN = 4
@@ -182,8 +182,8 @@ class Eye:
     def _defines(self) -> dict[str, Any]:
         step = neighborhood.spacing(self.width)
         return {"VOLUME": self.view.dimension - 2, "RADIUS": self.width // 2, "FOOT": step, "SPACING": step,
-                "FIRST": step // 2, "BORDER": self._border, "DIMS": self.matcher.space.dims,
-                "BLOCK": QUERIES_TOGETHER, "BOX": BOX, "CANDIDATES": self.settings.k, "DAMPING": f"{DAMPING}f"}
+                "FIRST": step // 2, "BORDER": self._border,
+                **search.defines(self.matcher.space.dims, self.settings.k)}
 
     def _program(self, eight: bool) -> Any:
         return opencl.program(Path(__file__).with_suffix(".cl"), SEEN=int(eight), **self._defines)
@@ -511,7 +511,7 @@ def carry(H: np.ndarray, motion: np.ndarray) -> np.ndarray:
 
 def _program_without_views() -> Any:
     return opencl.program(Path(__file__).with_suffix(".cl"), VOLUME=0, RADIUS=0, FOOT=0, SPACING=1, FIRST=0, BORDER=0,
-                          SEEN=0, DIMS=16, BLOCK=1, BOX=BOX, CANDIDATES=1, DAMPING="0.0f")
+                          SEEN=0, **search.defines(16, 1))
 
 
 def _grown(field: np.ndarray) -> np.ndarray:
