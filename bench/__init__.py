@@ -10,5 +10,6 @@ all, prints tables and writes out/bench.json.
     search       the exact search beside FAISS
     density      the density window beside SciPy
     repeat       the same bits: run after run, at any thread count, from any kernel cache
+    solid        ma09 3-D: time, memory, growth, quality of both searches
     quality      five numbers and whole motifs for every built-in exemplar, and what helped
 """

@@ -6,7 +6,8 @@ import pytest
 from synth.motion.exemplar import exemplar
 from synth.motion.frames import local_frame
 from synth.motion.neighborhood import exemplar_patches
-from synth.motion.quality import RADIUS, measure, motif, oriented, whole_motifs
+from synth.motion.quality import RADIUS, measure, measure_view, motif, oriented, whole_motifs
+from synth.motion.solid import View
 
 CLOSED = ["circle", "square", "heart"]
 
@@ -179,3 +180,24 @@ def test_local_frames_of_a_flow_are_what_measure_expects():
     H, _, I = tiled()
     L = along(0, H.shape[:2])
     assert measure(H, local_frame(L), I).forward < 2e-3
+
+
+def test_a_view_of_its_own_extrusion_is_perfect():
+    I = exemplar("heart", 16)
+    view = View(I, (0, 0, 1), (0, 1, 0))  # from the side: its right is z
+    H = np.zeros((32, 48, 20, 3), np.float32)
+    tiles = np.tile(I, (3, 2, 1))  # rows along y, columns along z
+    H[..., 2], H[..., 1] = (tiles[:, :, None, c].swapaxes(0, 1) for c in (0, 1))
+    frame = np.broadcast_to(np.eye(3, dtype=np.float32), (*H.shape[:3], 3, 3))
+    found = measure_view(H, frame, view)
+    assert found.forward < 1e-3 and found.rms == pytest.approx(1) and found.gradient == pytest.approx(1, rel=0.05)
+    assert found.backward < 0.5 and found.used > 0.2  # only every second cell holds a neighbourhood
+    blurred = measure_view(0.5 * H, frame, view)
+    assert blurred.rms == pytest.approx(0.5) and blurred.gradient == pytest.approx(0.5 * found.gradient)
+    assert blurred.forward > 0.1
+
+
+def test_a_field_too_small_for_a_view_is_refused():
+    frame = np.broadcast_to(np.eye(3, dtype=np.float32), (12, 20, 20, 3, 3))
+    with pytest.raises(ValueError, match="holds no neighbourhood"):
+        measure_view(np.zeros((12, 20, 20, 3), np.float32), frame, View(exemplar("heart", 16)))

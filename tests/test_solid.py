@@ -138,7 +138,7 @@ SHAPES = pytest.mark.parametrize("shape", [(5, 7, 3), (2, 2, 2), (4, 3, 9)])
 @SHAPES
 def test_gather_and_search_equal_their_references(shape, dimension, dominant):
     b = Bench(dimension, shape, dominant)
-    match, position, distance = b.eye.search(solid._four(b.field), b.legs, b.grid, None)
+    match, position, distance = b.eye.search(solid.on_device(b.field), b.legs, b.grid, None)
     seen = solid.gather_reference(b.field, b.sites, b.on_host, b.eye.view, 2, float(b.eye.slab), 1)
     space = b.eye.matcher.space
     queries = (seen - space.mean) @ space.basis
@@ -151,7 +151,7 @@ def test_gather_and_search_equal_their_references(shape, dimension, dominant):
         cell = np.stack([match.get() % columns, match.get() // columns], -1)
         assert np.abs(position.get() - cell).max() <= 0.5
     # and from there by k-coherence
-    found, _, distance = b.eye.search(solid._four(b.field), b.legs, b.grid, match)
+    found, _, distance = b.eye.search(solid.on_device(b.field), b.legs, b.grid, match)
     best, least = solid.coherent_reference(space.points, b.eye.matcher.similar.get(), b.eye.exemplar.shape[:-1],
                                            queries.astype(np.float32), b.sites, b.on_host, b.grid, match.get())
     np.testing.assert_allclose(distance.get(), least, rtol=1e-3, atol=1e-3)
@@ -164,13 +164,12 @@ def test_gather_and_search_equal_their_references(shape, dimension, dominant):
 def test_average_equals_its_reference(shape, dimension, dominant, eight):
     b = Bench(dimension, shape, dominant)
     out = opencl.empty((*shape, 4))
-    b.eye.average(opencl.to_device(b.position), opencl.to_device(b.weight), b.legs, b.grid, solid._four(b.field), out,
-                  eight, True)
+    given = (opencl.to_device(b.position), opencl.to_device(b.weight), b.legs, b.grid, solid.on_device(b.field), out)
+    b.eye.average(*given, eight, True)
     expected = solid.average_reference(b.eye, b.position, b.weight, b.sites, b.on_host, b.field, eight)
     np.testing.assert_allclose(out.get()[..., :3], expected, atol=2e-4)
     # a second view adds to what the first said
-    b.eye.average(opencl.to_device(b.position), opencl.to_device(b.weight), b.legs, b.grid, solid._four(b.field), out,
-                  eight, False)
+    b.eye.average(*given, eight, False)
     np.testing.assert_allclose(out.get()[..., :3], 2 * expected, atol=4e-4)
 
 
@@ -179,7 +178,7 @@ def test_average_equals_its_reference(shape, dimension, dominant, eight):
 def test_nearest_equals_its_reference(shape, dimension, dominant):
     b = Bench(dimension, shape, dominant)
     out = opencl.empty((*shape, 4))
-    b.eye.nearest(opencl.to_device(b.position), b.legs, b.grid, solid._four(b.field), out, True)
+    b.eye.nearest(opencl.to_device(b.position), b.legs, b.grid, solid.on_device(b.field), out, True)
     expected = solid.nearest_reference(b.eye, b.position, b.sites, b.on_host, b.field)
     np.testing.assert_allclose(out.get()[..., :3], expected, atol=2e-4)
 

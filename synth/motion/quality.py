@@ -14,6 +14,7 @@ from scipy import ndimage
 from synth import opencl
 from synth.motion.neighborhood import Space, exemplar_patches
 from synth.motion.search import Matcher
+from synth.motion.solid import Eye, Settings, View, on_device, site_grid
 
 RADIUS = 4
 # an exemplar neighbourhood weaker than this share of the exemplar's rms shows nothing that could be missed
@@ -59,6 +60,11 @@ def _identical(patches: np.ndarray, step: float) -> np.ndarray:
     return np.unique(rows, return_inverse=True)[1].reshape(-1)
 
 
+def _mean_distance(squared: np.ndarray, length: int) -> float:
+    """Mean of the rms distances over `length` numbers, squared (S,) their squared sums."""
+    return float(np.mean(np.sqrt(squared.astype(np.float64) / length)))
+
+
 def _whole_space(patches: np.ndarray) -> Space:
     """The neighbourhoods themselves as a space: nothing projected away, zero columns up to a multiple of 16."""
     length = patches.shape[1]
@@ -89,12 +95,45 @@ def measure(H: np.ndarray, frame: np.ndarray, exemplar: np.ndarray) -> Quality:
     same = _identical(ours, SAME * rms)
     nearest = np.isin(same, same[best.get()])
 
-    def mean_distance(squared: np.ndarray) -> float:
-        return float(np.mean(np.sqrt(squared.astype(np.float64) / ours.shape[1]))) / rms
-
-    return Quality(mean_distance(forward.get()), mean_distance(backward.get()),
+    length = ours.shape[1]
+    return Quality(_mean_distance(forward.get(), length) / rms, _mean_distance(backward.get(), length) / rms,
                    float(nearest[visible].mean()) if visible.any() else 1.0, _rms(H) / rms,
                    _gradient(H, False) / max(_gradient(exemplar, True), 1e-12))
+
+
+def measure_view(H: np.ndarray, frame: np.ndarray, view: View) -> Quality:
+    """The five numbers of H (Z, Y, X, 3), local coordinates, as one view sees it; frame (Z, Y, X, 3, 3).
+
+    9² neighbourhoods on every second cell, in the space of the exemplar's own; the gradients are along right and up.
+    """
+    width = 2 * RADIUS + 1
+    eye = Eye(view, view.exemplar, view.projection.T, width, Settings(1, (width,)), False)
+    inset = int(np.ceil(RADIUS * np.sqrt(3)))
+    if min(H.shape[:3]) <= 2 * inset:
+        raise ValueError(f"a field of {H.shape[2]} x {H.shape[1]} x {H.shape[0]} cells holds no neighbourhood of 9³")
+    local = frame[site_grid(H.shape[:3], width)]
+    whole = np.zeros(local.shape[:3], bool)
+    whole[(slice(inset // 2, -(inset // 2)),) * 3] = True
+    queries = eye.queries(on_device(H), eye.legs(local), local.shape[:3], 0, whole.size).get()[whole.ravel()]
+    space, length = eye.matcher.space, eye.matcher.space.length
+    best, forward = eye.matcher.exact(opencl.to_device(queries))
+    theirs = Space(RADIUS, space.mean, space.basis, queries)
+    _, backward = Matcher(theirs, (1, len(queries)), 1).exact(opencl.to_device(space.points))
+    rms = max(_rms(view.exemplar), 1e-12)
+    patches = exemplar_patches(view.exemplar, RADIUS)
+    visible = np.sqrt(np.mean(patches.astype(np.float64) ** 2, axis=1)) > FAINT * rms
+    same = _identical(patches, SAME * rms)
+    seen = H @ view.projection.T.astype(np.float32)
+    slopes = np.stack(np.gradient(seen, axis=(2, 1, 0)), -1) @ (frame @ view.legs[:2].T.astype(np.float32))
+    continued = np.pad(view.exemplar, ((1, 1), (1, 1), (0, 0)), mode="wrap")
+    ours = np.stack(np.gradient(continued, axis=(1, 0)), -1)[1:-1, 1:-1]
+
+    def steepness(gradient: np.ndarray) -> float:
+        return float(np.mean(np.linalg.norm(gradient, axis=-2)))
+
+    return Quality(_mean_distance(forward.get(), length) / rms, _mean_distance(backward.get(), length) / rms,
+                   float(np.isin(same, same[best.get()])[visible].mean()), _rms(seen) / rms,
+                   steepness(slopes) / max(steepness(ours), 1e-12))
 
 
 def oriented(H: np.ndarray, at: np.ndarray, e: np.ndarray, size: tuple[int, int]) -> np.ndarray:

@@ -218,25 +218,32 @@ class Eye:
         legs[..., :3] = np.einsum("lk,sdk->sld", self.view.legs.astype(np.float32), frame.reshape(-1, 3, 3))
         return opencl.to_device(legs)
 
+    def queries(self, field: Any, legs: Any, grid: tuple[int, ...], first: int, count: int) -> Any:
+        """Neighbourhoods of `count` sites from `first` on, as the view sees them (§3.2, Project): (count, D).
+
+        field (Z, Y, X, 4), legs as `legs` gives them, grid (K, J, I) of sites.
+        """
+        rows = -(-count // neighborhood.SITES_TOGETHER) * neighborhood.SITES_TOGETHER
+        patches = opencl.empty((rows, self.matcher.space.length))
+        self._program(True).gather(
+            (count,), (1,), field, np.array([*field.shape[2::-1], 1], np.int32), legs,
+            np.array([*grid[::-1], 1], np.int32), np.int32(first), *self._basis[:2], self.slab, patches)
+        return self.matcher.space.compare(patches, count)
+
     def search(self, field: Any, legs: Any, grid: tuple[int, ...], match: Any) -> tuple[Any, Any, Any]:
         """Matches of all sites: device index (S,), position in the exemplar (S, 2 or 4), squared distance (S,).
 
         match (S,) of the last search, for k-coherence; None: exact.
         """
-        space, count = self.matcher.space, legs.shape[0]
+        count = legs.shape[0]
         best, distance = opencl.empty(count, np.int32), opencl.empty(count)
         positions = []
-        size = np.array([*field.shape[2::-1], 1], np.int32)
         cells = np.array([*grid[::-1], 1], np.int32)
         exemplar = np.array([*self.exemplar.shape[-2::-1], 1, 1][:4], np.int32)
         program = self._program(True)
         for first in range(0, count, SITES_AT_ONCE):
             some = min(SITES_AT_ONCE, count - first)
-            rows = -(-some // neighborhood.SITES_TOGETHER) * neighborhood.SITES_TOGETHER
-            patches = opencl.empty((rows, space.length))
-            program.gather((some,), (1,), field, size, legs, cells, np.int32(first), *self._basis[:2], self.slab,
-                           patches)
-            queries = space.compare(patches, some)
+            queries = self.queries(field, legs, grid, first, some)
             if match is None:
                 best[first:first + some], distance[first:first + some] = self.matcher.exact(queries)
             else:
@@ -301,7 +308,7 @@ class Level:
         coherence (Z, Y, X) holds the result to H as it came; boundary is the E_n of Eq. 3. Returns
         H and the mean distance of the last matches over the views, as a share of their exemplars' rms.
         """
-        x = _four(H)
+        x = on_device(H)
         prior = x
         held = opencl.zeros(H.shape[:3]) if coherence is None else opencl.to_device(coherence)
         distance = 0.0
@@ -343,7 +350,7 @@ class Level:
         return chosen, found, distance
 
 
-def _four(H: np.ndarray) -> Any:
+def on_device(H: np.ndarray) -> Any:
     """(Z, Y, X, 3) on the device as (Z, Y, X, 4)."""
     padded = np.zeros((*H.shape[:3], 4), np.float32)
     padded[..., :3] = H
@@ -505,7 +512,7 @@ def carry(H: np.ndarray, motion: np.ndarray) -> np.ndarray:
     shape = H.shape[:3]
     displacement = Grid(shape, "clamp").departure(opencl.to_device(np.ascontiguousarray(motion)))
     out = opencl.empty((*shape, 4))
-    _program_without_views().carry_solid(shape[::-1], None, _four(H), displacement, out)
+    _program_without_views().carry_solid(shape[::-1], None, on_device(H), displacement, out)
     return np.ascontiguousarray(out.get()[..., :3])
 
 
