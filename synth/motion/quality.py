@@ -66,11 +66,15 @@ def _mean_distance(squared: np.ndarray, length: int) -> float:
 
 
 def _whole_space(patches: np.ndarray) -> Space:
-    """The neighbourhoods themselves as a space: nothing projected away, zero columns up to a multiple of 16."""
+    """The neighbourhoods (E, C) themselves as a space, only turned so that the first dimensions vary most, by which
+    the search can pass over many; zero columns up to a multiple of 16."""
     length = patches.shape[1]
-    dims = -(-length // 16) * 16
-    return Space(RADIUS, np.zeros(length, np.float32), np.eye(length, dims, dtype=np.float32),
-                 np.pad(patches, ((0, 0), (0, dims - length))))
+    mean = patches.mean(axis=0)
+    centred = (patches - mean).astype(np.float64)
+    _, vectors = np.linalg.eigh(centred.T @ centred)
+    basis = np.zeros((length, -(-length // 16) * 16), np.float32)
+    basis[:, :length] = vectors[:, ::-1]
+    return Space(RADIUS, mean, basis, (patches - mean) @ basis)
 
 
 def measure(H: np.ndarray, frame: np.ndarray, exemplar: np.ndarray) -> Quality:
@@ -88,8 +92,8 @@ def measure(H: np.ndarray, frame: np.ndarray, exemplar: np.ndarray) -> Quality:
     theirs = whole.project(opencl.to_device(H), opencl.to_device(sites),
                            opencl.to_device(frame[sites[:, 1], sites[:, 0]]))
     best, forward = Matcher(whole, exemplar.shape[:2], 1).exact(theirs)
-    _, backward = Matcher(_whole_space(theirs.get()[:, :ours.shape[1]]), H.shape[:2], 1).exact(
-        opencl.to_device(whole.points))
+    seen = Space(RADIUS, whole.mean, whole.basis, theirs.get())
+    _, backward = Matcher(seen, H.shape[:2], 1).exact(opencl.to_device(whole.points))
     rms = max(_rms(exemplar), 1e-12)
     visible = np.sqrt(np.mean(ours.astype(np.float64) ** 2, axis=1)) > FAINT * rms
     same = _identical(ours, SAME * rms)
