@@ -89,11 +89,28 @@ def solid_rows(found: dict[str, Any]) -> Iterable[Row]:
            "not said")
 
 
+def boundary_rows(found: dict[str, Any]) -> Iterable[Row]:
+    rows = found["texture at the boundary"]
+
+    def mean(observed: str, key: str) -> float:
+        chosen = [row[key] for row in rows if row["boundary"] == observed]
+        return sum(chosen) / len(chosen)
+
+    worst = max(row["wall, rms"] for row in rows if row["boundary"] == "observed")
+    yield ("ma09 figure 7, normal component of H at the wall", f"{worst:.2%} of the rms", "2 %", verdict(worst <= 0.02),
+           f"not observed: {mean('not', 'wall, rms'):.0%}")
+    energy, without = (f"{mean(w, 'forward'):.3f} / {mean(w, 'backward'):.3f}" for w in ("observed", "not"))
+    yield ("    texture, forward / backward distance", energy, "-", "", f"not observed: {without}")
+    left = max(row["divergence"] for row in found["projection past a ball"])
+    yield ("projection past a ball, divergence over the rms gradient", f"{left:.1e}", "1e-4", verdict(left <= 1e-4),
+           "not said")
+
+
 ROWS: dict[str, Callable[[dict[str, Any]], Iterable[Row]]] = {
     "synthesis": synthesis_rows, "search": search_rows, "density": density_rows, "repeat": repeat_rows,
-    "solid": solid_rows, "potential": potential_rows, "lagrangian": lagrangian_rows}
+    "solid": solid_rows, "potential": potential_rows, "lagrangian": lagrangian_rows, "boundary": boundary_rows}
 # lists of equal rows each: printed as tables of their own
-TABLES = ("quality", "solid", "potential", "lagrangian")
+TABLES = ("quality", "solid", "potential", "lagrangian", "boundary")
 PARTS = tuple(dict.fromkeys((*ROWS, *TABLES)))
 
 

@@ -247,6 +247,22 @@ def test_the_whole_chain_keeps_to_the_wall(coarse: str) -> None:
     assert np.sqrt(np.mean(through**2)) < 0.02 * np.sqrt(np.mean(H.values**2))
 
 
+def test_in_space_the_whole_chain_keeps_to_the_wall_and_hands_it_on_as_a_level_set() -> None:
+    written(BALL.replace("0.5]", "0.5, 0.0]"), coarse='kind = "analytic"\nsize = [12, 12, 8]', size="[24, 24, 16]")
+    assert cli.run(["figure", "tiny.toml"]) == 0
+    out = Path("out/tiny")
+    away = volumes.read(out / "fields/solid.vdb")["surface"]
+    assert volumes.read_level_set(out / "fields/solid.vdb", "surface", "key") == away
+    cells = away.values * 24
+    assert near(cells, obstacle.ball((16, 24, 24), (0, 0.5, 0), 0.2).distance) < 1e-4
+    L, F = (volumes.read(out / f"{name}.0002.vdb")["vel"].per_frame(30).values for name in ("fields/L", "geometry/F"))
+    detail = (F - L) / 0.5
+    slope = np.sqrt(np.mean([np.gradient(L, axis=a) ** 2 for a in range(3)]))
+    assert np.sqrt(np.mean(divergence(L, "open", cells) ** 2)) < 1e-4 * slope
+    through = np.sum(detail * obstacle.outward(cells), -1)[np.abs(cells) < 0.5]
+    assert np.sqrt(np.mean(through**2)) < 0.02 * np.sqrt(np.mean(np.sum(detail**2, -1)))
+
+
 def test_without_the_boundary_the_detail_goes_its_way() -> None:
     written(BALL + "\n")
     text = Path("tiny.toml").read_text().replace("iterations = 1", "iterations = 1\nboundary = false")
