@@ -142,10 +142,12 @@ __kernel void coherent_solid(__global const float *points, __global const int *s
 #if SEEN
 #define FROM(i, n) clamp((i - FIRST) / SPACING, 0, n - 1)
 #define TO(i, n) min(FROM(i, n) + 1, n - 1)
+#define TOO_FAR(way) false
 #else
 // no match reaches further than `reach`: the corner of its foot, half a slab from its plane
 #define FROM(i, n) (max(0, i - reach - FIRST + SPACING - 1) / SPACING)
 #define TO(i, n) min(n - 1, (i + reach - FIRST) / SPACING)
+#define TOO_FAR(way) (dot(way, way) > furthest)
 #endif
 
 #define EACH_SITE(body)                                                              \
@@ -155,6 +157,7 @@ __kernel void coherent_solid(__global const float *points, __global const int *s
                 const int s = (k * grid.y + j) * grid.x + i;                         \
                 const float4 way = (float4)(x - (i * SPACING + FIRST), y - (j * SPACING + FIRST), \
                                             z - (k * SPACING + FIRST), 0.0f);        \
+                if (TOO_FAR(way)) continue;                                          \
                 const float4 o = (float4)(dot(legs[3 * s], way), dot(legs[3 * s + 1], way), \
                                           dot(legs[3 * s + 2], way), 0.0f);          \
                 body                                                                 \
@@ -188,7 +191,8 @@ __kernel void average(__global const texel *exemplar, int4 exemplar_size, __glob
                       __global float4 *out) {
     const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
     const int here = (z * get_global_size(1) + y) * get_global_size(0) + x;
-    const int reach = (int)ceil(sqrt(2.0f * FOOT * FOOT + slab * slab));
+    const float furthest = 2.0f * FOOT * FOOT + slab * slab + 0.1f;
+    const int reach = (int)sqrt(furthest);
     spread sum = (spread)(0.0f);
     float total = 0.0f;
     EACH_SITE({
