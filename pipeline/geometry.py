@@ -69,8 +69,16 @@ def _require_smoke(scene: Scene) -> None:
         raise ValueError("no smoke enters: each source lies outside the domain, or its level or duty is 0")
 
 
-def _placed(scene: Scene, density: np.ndarray) -> Field:
-    """A density where it was made, or one of the plane with the body that [density.depth] gives it."""
+def _placed(scene: Scene, stock: Stock, density: np.ndarray) -> Field:
+    """A density where it was made, or one of the plane with the body that [density.depth] gives it; none of it inside
+    an obstacle, where a source may have put it."""
+    away = obstacles.distance(scene, stock)
+    if away is not None:
+        from synth.pyramid import resample
+
+        share = 1 / scene.density.scale
+        fine = resample(away, density.shape, (0.5 * share - 0.5,) * away.ndim, share)
+        density = density * np.clip(fine * scene.density.scale + 0.5, 0, 1)
     if scene.density.depth is None:
         return Field.centred(density, scene.dimension)
     from synth.motion.depth import inflate
@@ -106,7 +114,7 @@ def make_density(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tupl
         every = windowed(L, F, sources(scene), wanted.m, **settings)
     for frame, values in enumerate(every, start=1):
         if frame in frames:
-            yield frame, _placed(scene, values)
+            yield frame, _placed(scene, stock, values)
 
 
 def _carried(scene: Scene, stock: Stock, frame: int) -> Any:
@@ -142,7 +150,7 @@ def _window(scene: Scene, stock: Stock, O: np.ndarray | None, frame: int, settin
     first = max(frame - scene.density.m, 0) + 1
     motion = (_carried(scene, stock, i) for i in range(first, frame + 1))
     values = window(O, motion, sources(scene), first, **settings)
-    return _placed(scene, values)
+    return _placed(scene, stock, values)
 
 
 def _ply(scene: Scene) -> str:
@@ -254,9 +262,9 @@ def products(scene: Scene) -> tuple[Product, ...]:
     every: tuple[tuple[str, Frames], ...] = (("L", "until"), ("H", "until"), *facing(scene, "until"))
     density = Product(
         name="density", stage="bake", folder="geometry", suffix=_density_suffix,
-        reads=("density", "combine", *LOCAL_FRAME, "seed", "fps"), inputs=(*every, *solid),
-        methods=("synth.motion.density", "synth.motion.depth", *TRANSFORM), make=make_density, write=write_field,
-        read=read_field, memory=density_memory)
+        reads=("density", "combine", *LOCAL_FRAME, "seed", "fps"), inputs=(*every, *obstacles.inputs(scene)),
+        methods=("synth.motion.density", "synth.motion.depth", "synth.pyramid", *TRANSFORM), make=make_density,
+        write=write_field, read=read_field, memory=density_memory)
     particles = Product(
         name="particles", stage="bake", folder="geometry", suffix=_ply,
         reads=("particles", "combine", *LOCAL_FRAME, "seed", "fps"), inputs=(*every, *obstacles.inputs(scene)),

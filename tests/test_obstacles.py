@@ -166,6 +166,7 @@ def refused(text: str, capsys: pytest.CaptureFixture[str], **settings: str) -> s
     (BALL.replace("radius = 0.2", "radius = -0.2"), {}, "obstacles[0].radius[0]: should be greater than 0"),
     ("", {"coarse": WAKE}, "coarse.kind: \"wake\" needs a stone"),
     (BALL, {"coarse": WAKE + "\ngains = [0.1]"}, "coarse.gains: 1 gains for 3 lengths"),
+    ('samples = "lagrangian"\n' + BALL, {}, "detail.samples: samples that move do not observe a boundary"),
 ])
 def test_what_no_scene_can_have(capsys: pytest.CaptureFixture[str], text: str, settings: dict[str, str],
                                 expected: str) -> None:
@@ -261,6 +262,16 @@ def test_in_space_the_whole_chain_keeps_to_the_wall_and_hands_it_on_as_a_level_s
     assert np.sqrt(np.mean(divergence(L, "open", cells) ** 2)) < 1e-4 * slope
     through = np.sum(detail * obstacle.outward(cells), -1)[np.abs(cells) < 0.5]
     assert np.sqrt(np.mean(through**2)) < 0.02 * np.sqrt(np.mean(np.sum(detail**2, -1)))
+
+
+def test_no_smoke_stands_inside_an_obstacle() -> None:
+    written(BALL, render="lit")
+    text = Path("tiny.toml").read_text()
+    Path("tiny.toml").write_text(text + "[density]\nm = 1\nsources = [{ centre = [0.0, 0.5], radius = 0.4 }]\n")
+    assert cli.run(["bake", "tiny.toml"]) == 0
+    density = images.read_field(Path("out/tiny/geometry/density.0002.exr")).values
+    fine = obstacle.ball((48, 64), (0, 0.5), 0.2).distance
+    assert not density[fine < -1].any() and density[(fine > 1) & (fine < 6)].mean() > 0.3
 
 
 def test_without_the_boundary_the_detail_goes_its_way() -> None:
