@@ -1,5 +1,7 @@
 """What synth makes: exemplars of every kind, L in world units, H that goes on where it was stopped."""
 
+import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -279,3 +281,21 @@ def test_detail_in_space_goes_on_from_its_state_with_the_same_bits(tmp_path: Pat
     assert dict(fields.make_detail(made, stock, [3])) == {3: every[3]}
     (tmp_path / fields.STATE).unlink()
     assert dict(fields.make_detail(made, stock, [3])) == {3: every[3]}
+
+
+def test_another_program_opens_what_is_written_the_right_way_up(tmp_path: Path) -> None:
+    """OpenVDB's own tool agrees where a marked vector lies: third column, fourth row, first layer of 6 × 5 × 4."""
+    made = scene(**SPACE)
+    values = np.zeros((4, 5, 6, 3), np.float32)
+    values[0, 3, 2] = (1.0, -2.0, 3.0)
+    product = next(p for p in fields.products(made) if p.name == "L")
+    product.write(tmp_path / "L.vdb", Field.centred(values, 3), made)
+    told = subprocess.run(["vdb_print", "-l", "-m", tmp_path / "L.vdb"], capture_output=True, text=True,
+                          check=True).stdout
+    assert "Name: vel" in told and "Type: Tree_vec3s" in told
+    assert "Bounding box of active voxels: [2, 3, 0] -> [2, 3, 0]" in told
+    assert re.search(r"Max value: \[1, -2, 3\]", told)
+    assert "unit: world units per second" in told
+    matrix = [[float(n) for n in row.split(",")] for row in re.findall(r"\[([^\[\]]+)\] ?\n", told)][-4:]
+    scale = [[0.2, 0, 0, 0], [0, 0.2, 0, 0], [0, 0, 0.2, 0]]
+    np.testing.assert_allclose(matrix, [*scale, [-0.5, 0.1, -0.3, 1]], atol=1e-6)

@@ -65,10 +65,10 @@ def contents(root: Path) -> dict[str, bytes]:
     return {file.relative_to(root).as_posix(): file.read_bytes() for file in sorted(root.rglob("*")) if file.is_file()}
 
 
-def run(folder: Path) -> dict[str, bytes]:
+def run(folder: Path, scene: str = SCENE, verb: str = "figure") -> dict[str, bytes]:
     """What an uninterrupted run leaves in folder/out/tiny."""
-    (folder / "tiny.toml").write_text(SCENE)
-    stages.run("figure", load(folder / "tiny.toml"), folder / "out", Progress(quiet=True))
+    (folder / "tiny.toml").write_text(scene)
+    stages.run(verb, load(folder / "tiny.toml"), folder / "out", Progress(quiet=True))
     return contents(folder / "out" / "tiny")
 
 
@@ -78,11 +78,12 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return run(tmp_path_factory.mktemp("reference"))
 
 
-def stopped(folder: Path, name: str, by: signal.Signals) -> subprocess.CompletedProcess[str]:
-    """`flowloom figure`, stopped while the file `name` is written and not yet in its place."""
-    (folder / "tiny.toml").write_text(SCENE)
+def stopped(folder: Path, name: str, by: signal.Signals, scene: str = SCENE,
+            verb: str = "figure") -> subprocess.CompletedProcess[str]:
+    """`flowloom figure`, or another verb, stopped while the file `name` is written and not yet in its place."""
+    (folder / "tiny.toml").write_text(scene)
     flag = folder / "flag"
-    command = [sys.executable, "-P", "-c", HELD, name, str(flag), "figure", "tiny.toml"]
+    command = [sys.executable, "-P", "-c", HELD, name, str(flag), verb, "tiny.toml"]
     process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 100
     while not flag.exists() and process.poll() is None and time.monotonic() < deadline:
@@ -124,6 +125,36 @@ def test_a_stopped_run_leaves_nothing_half_written_and_the_next_one_goes_on(
     if code > 0:
         assert not [path for path in hidden if path.endswith(".partial")]
     assert run(tmp_path) == reference
+
+
+SOLID = SCENE.replace("[8, 8]", "[8, 8, 8]").replace(
+    "size = [16, 16]", 'size = [16, 16, 16]\nfacing = "density"\nlevels = 1').replace(
+    "m = 1\n", "m = 2\nsources = [{ centre = [0.0, 0.5], radius = 0.3 }]\n").replace(
+    "frames = 2", "frames = 3").replace('"lit"', '"volume"')
+
+
+@pytest.fixture(scope="module")
+def solid_reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """What an uninterrupted bake in space leaves."""
+    return run(tmp_path_factory.mktemp("solid"), SOLID, "bake")
+
+
+@pytest.mark.parametrize(("name", "by", "code"), [
+    ("O.0002.vdb", signal.SIGKILL, -9),
+    ("H.0003.vdb", signal.SIGTERM, 143),
+    ("H.state.npz", signal.SIGKILL, -9),
+    ("density.0003.vdb", signal.SIGKILL, -9),
+])
+def test_in_space_too_the_next_run_goes_on_with_the_same_bits(
+        tmp_path: Path, solid_reference: dict[str, bytes], name: str, by: signal.Signals, code: int) -> None:
+    assert stopped(tmp_path, name, by, SOLID, "bake").returncode == code
+    left = contents(tmp_path / "out" / "tiny")
+    for path in left:
+        if not any(part.startswith(".") for part in Path(path).parts):
+            assert left[path] == solid_reference[path], f"{path} is not whole"
+    if name == "H.0003.vdb":  # what the third frame goes on from
+        assert "fields/.whole/H.state.npz" in left
+    assert run(tmp_path, SOLID, "bake") == solid_reference
 
 
 @pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
