@@ -206,7 +206,9 @@ class Works:
                 self._folders[path].close(known, {"scene": self.scenes.name, "stage": stage})
         for noun in {path.relative_to(self.root).parts[0] for path in expected}:
             for path in (self.root / noun, *(self.root / noun).glob("*/")):
-                if path not in expected and (path / manifest.MANIFEST).exists():
+                # the folder of notes holds the manifest that work in progress has set aside
+                past = path not in expected and path.name != manifest.NOTES
+                if past and (path / manifest.MANIFEST).exists():
                     Folder(path).discard()
 
 

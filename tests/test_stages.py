@@ -285,3 +285,37 @@ def test_values_that_no_schema_can_know_are_bad_input(tmp_path: Path) -> None:
     text = SCENE.replace('kind = "circle"', 'kind = "bitmap"\nfile = "blank.png"')
     with pytest.raises(BadInput, match=r"exemplar: .*blank"):
         made(tmp_path, text)
+
+
+SEAWEED = SCENE.replace("frames = 3", "frames = 4").replace("size = [8, 8]", "size = [8, 4, 8]").replace(
+    "size = [16, 16]", "size = [16, 8, 16]").replace('"rotation"', '"constant"').replace(
+    '["input", "coarse", "result"]', '["exemplar-colour", "result"]').replace('kind = "lit"\nwidth = 32', """\
+kind = "seaweed"
+width = 32
+height = 18
+spp = 1
+[blades]
+spacing = 0.4
+window = 3""")
+
+
+def test_seaweed_through_the_whole_chain(tmp_path: Path) -> None:
+    """Figure 9 of ma09 in small: each stage leaves its files, a change makes again what it changes, and the blades of
+    one frame, made apart, are those of all frames made in a row."""
+    root = made(tmp_path, SEAWEED)
+    whole, before = bits(root), births(root)
+    for series in ("fields/L.{}.vdb", "fields/H.{}.vdb", "geometry/F.{}.vdb", "geometry/blades.{}.ply",
+                   "images/beauty.{}.exr"):
+        assert {series.format(f"{n:04d}") for n in range(1, 5)} <= set(whole)
+    assert {"tiny.png", "tiny.mp4", "fields/exemplar.exr", "images/exemplar-colour.exr"} <= set(whole)
+    assert whole["geometry/blades.0003.ply"] != whole["geometry/blades.0004.ply"]
+
+    for frame in (2, 4):
+        (root / "geometry" / f"blades.{frame:04d}.ply").unlink()
+    made(tmp_path, SEAWEED, "bake", frames=[4])
+    made(tmp_path, SEAWEED, "bake", frames=[2])
+    assert remade(root, before) == {"geometry/blades"}
+    assert bits(made(tmp_path, SEAWEED)) == whole
+
+    made(tmp_path, SEAWEED.replace("window = 3", "window = 2"))
+    assert remade(root, before) == {"geometry/blades", "images/beauty", "tiny"}
