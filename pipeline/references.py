@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
+import math
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -90,7 +91,8 @@ def proofs(works: stages.Works) -> Iterator[Proof]:
         scene = works.scenes.variants[variant]
         render = proof_settings(scene.render)
         product, frame = works.products[variant]["beauty"], shown_frame(scene)
-        made = product.make(scene.model_copy(update={"render": render}), _Stock(works, variant), [frame])
+        small = scene.model_copy(update={"render": render})
+        made = product.make(small, _Stock(works, variant, small), [frame])
         folder = works.file(variant, "beauty", frame).parent.relative_to(works.root)
         light = np.asarray(next(made)[1], np.float32)
         yield Proof((folder / PROOF).as_posix(), light, made_with(render.kind))
@@ -103,18 +105,24 @@ def proof_settings(render: Any) -> Any:
     if render.kind == "volume":
         height = round(render.height * width / render.width)
         small |= {"height": height, "spp": PROOF_SAMPLES, "denoised": False}
+    if render.kind == "seaweed":
+        small |= {"height": round(render.height * width / render.width), "spp": PROOF_SAMPLES}
+    if render.kind == "particles":
+        small |= {"spp": PROOF_SAMPLES}
     return render.model_copy(update=small)
 
 
 class _Stock:
-    """product.Stock for a proof, which is made in memory from whole files."""
+    """product.Stock for a proof, which is made in memory from whole files; other pictures that it needs too."""
 
-    def __init__(self, works: stages.Works, variant: str):
-        self._works, self._variant = works, variant
+    def __init__(self, works: stages.Works, variant: str, small: Scene):
+        self._works, self._variant, self._small = works, variant, small
 
     def read(self, product: str, frame: int = 0) -> Any:
-        scene, made = self._works.scenes.variants[self._variant], self._works.products[self._variant]
-        return made[product].read(self._works.file(self._variant, product, frame), scene)
+        scene, made = self._works.scenes.variants[self._variant], self._works.products[self._variant][product]
+        if made.stage == "render":
+            return next(made.make(self._small, self, [frame]))[1]
+        return made.read(self._works.file(self._variant, product, frame), scene)
 
     def own(self, frame: int) -> Any | None:
         return None
@@ -129,12 +137,16 @@ class _Stock:
 
 def _read(works: stages.Works, variant: str, product: str, file: Path) -> np.ndarray:
     value = works.products[variant][product].read(file, works.scenes.variants[variant])
+    if isinstance(value, dict):  # a mesh or points: all their numbers, in a square that a page can show
+        numbers = np.concatenate([np.ravel(value[name]).astype(np.float32) for name in sorted(value)])
+        side = math.isqrt(len(numbers) - 1) + 1
+        return np.pad(numbers, (0, side * side - len(numbers))).reshape(side, side)
     return np.asarray(getattr(value, "values", value))
 
 
 def made_with(kind: str) -> dict[str, str]:
     """The versions that a picture of this [render] kind depends on."""
-    if kind == "volume":
+    if kind in ("volume", "seaweed", "particles"):
         from render import backend
 
         return {"llvm": "none", **backend.versions("scalar_rgb")}  # a scalar variant does without

@@ -179,3 +179,27 @@ def test_references_of_the_project_stand_with_its_tests():
     project = references.PROJECT_SCENES.parent
     folder = references.folder_of(project / "scenes" / "ma09-fig01.toml")
     assert folder == project / "tests" / "references" / "ma09-fig01"
+
+
+def test_points_and_their_stage_are_kept_and_told(tmp_path, capsys):
+    """Particles are no field, and their picture needs another one: both by content, and a proof."""
+    file = tmp_path / "river.toml"
+    file.write_text("""title = "A river"
+frames = 2
+exemplar = { kind = "sinusoid", size = 8 }
+coarse = { kind = "wake", size = [16, 12] }
+obstacles = [{ kind = "ball", centre = [0.0, 0.5], radius = 0.2 }]
+detail = { size = [16, 12], iterations = 1, neighborhoods = [5] }
+combine = { omega = 0.5 }
+particles = { count = 40 }
+render = { kind = "particles", width = 16, spp = 1 }
+figure = { panel = 16 }
+""")
+    out = ["--out", str(tmp_path / "out")]
+    assert cli.run(["references", str(file), *out]) == 0
+    kept = {path.name for path in (tmp_path / "references" / "river").rglob("*.*")}
+    assert {"particles.0002.ply", "solid.exr", "proof.exr"} <= kept
+    assert cli.run(["diff", str(file), *out]) == 0
+    file.write_text(file.read_text().replace("count = 40", "count = 41"))
+    assert cli.run(["diff", str(file), *out]) == 1
+    assert "particles.0001.ply: " in capsys.readouterr().out
