@@ -88,9 +88,8 @@ def _component(axis: int, dimension: int) -> int:
 
 def _slope(a: np.ndarray, axis: int, border: str, of_pressure: bool) -> np.ndarray:
     """Central difference of `a` along an axis, with the border's ghost cells."""
-    n = a.shape[axis]
     padded = _continued(a, axis, border, of_pressure)
-    return 0.5 * (np.take(padded, range(2, n + 2), axis) - np.take(padded, range(n), axis))
+    return 0.5 * (_part(padded, axis, 2, None) - _part(padded, axis, None, -2))
 
 
 def _divergence(v: np.ndarray, border: str) -> np.ndarray:
@@ -122,15 +121,19 @@ def openings(distance: np.ndarray, border: str) -> list[np.ndarray]:
     return shares
 
 
+def _part(a: np.ndarray, axis: int, start: int | None, stop: int | None) -> np.ndarray:
+    """The view of `a` from start to stop along an axis."""
+    return a[(slice(None),) * axis + (slice(start, stop),)]
+
+
 def _paired(a: np.ndarray, axis: int) -> np.ndarray:
     """The sums of neighbours along an axis, one fewer."""
-    n = a.shape[axis]
-    return np.take(a, range(1, n), axis) + np.take(a, range(n - 1), axis)
+    return _part(a, axis, 1, None) + _part(a, axis, None, -1)
 
 
 def _continued(a: np.ndarray, axis: int, border: str, of_pressure: bool) -> np.ndarray:
     """`a` with the border's ghost cell at each end of an axis."""
-    first, last = np.take(a, [0], axis), np.take(a, [-1], axis)
+    first, last = _part(a, axis, 0, 1), _part(a, axis, -1, None)
     if border == "toroidal":
         return np.concatenate([last, a, first], axis)
     sign = _GHOST[border][of_pressure]
@@ -175,8 +178,7 @@ def _past(v: np.ndarray, border: str, distance: np.ndarray) -> np.ndarray:
     v = v - _push(p.reshape(shape), shares, border)
     closed = np.ones(shape, bool)
     for axis, share in enumerate(shares):
-        n = shape[axis]
-        closed &= (np.take(share, range(n), axis) == 0) & (np.take(share, range(1, n + 1), axis) == 0)
+        closed &= (_part(share, axis, None, -1) == 0) & (_part(share, axis, 1, None) == 0)
     closed &= distance < 0
     return _along_walls(v, closed, distance).astype(np.float32)
 
