@@ -13,8 +13,10 @@ def closed(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
     Runs in a child process (`shelter`), like all that touches a stranger's mesh. It need not succeed: the caller looks
     whether the result is watertight. Raises ValueError where there is nothing to mend.
     """
-    import pymeshlab
-
+    try:
+        import pymeshlab
+    except ImportError as error:  # it is linked with a library of windows and screens
+        raise ValueError(f"is not watertight, and pymeshlab cannot be loaded to mend it ({error})") from error
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(np.asarray(vertices, np.float64), np.asarray(faces, np.int32)))
     try:
