@@ -20,6 +20,7 @@ from synth.motion.detail import (
     State,
     Synthesis,
     deformation,
+    distance_inland,
     enough_levels,
     synthesize,
 )
@@ -201,6 +202,29 @@ def test_enough_levels_bring_the_exemplar_down_to_eight(size, levels):
 def test_an_empty_exemplar_is_refused():
     with pytest.raises(ValueError, match="zero everywhere"):
         Synthesis(np.zeros((16, 16, 2), np.float32), (48, 48), Settings(2), seed=0)
+
+
+def test_nothing_flows_in_where_nothing_flows():
+    assert (distance_inland(np.zeros((5, 7, 2), np.float32)) == np.inf).all()
+
+
+def test_the_distance_inland_is_that_upstream():
+    x = np.broadcast_to(np.arange(7), (5, 7))
+    np.testing.assert_allclose(distance_inland(constant((5, 7), -2.0)), np.where(x < 2, 0, x))
+    np.testing.assert_allclose(distance_inland(constant((5, 7), 2.0))[:, ::-1], np.where(x < 2, 0, x))
+    aslant = distance_inland(constant((9, 9), -0.5, 0.5))  # came from the left and from above
+    np.testing.assert_allclose(aslant[2], np.sqrt(2) * np.minimum(np.arange(9), 6), rtol=1e-6)
+
+
+def test_what_flows_in_is_synthesized_and_not_drawn_out():
+    """A flow to the right, twice the exemplar's width: the motifs that came in are no longer than the others."""
+    I, shape = exemplar("circle", 16), (48, 48)
+    L = constant(shape, 0.8)
+    H = list(synthesize(I, [L] * 41, shape, Settings(2), seed=1))[-1]
+    whole, total = whole_motifs(H[:, :32], local_frame(L)[:, :32], I)
+    assert total >= 2 and whole >= 0.7 * total
+    # drawn out, rows would not change along x
+    assert rms(np.diff(H[:, :32], axis=1)) > 0.85 * rms(np.diff(I, axis=1))
 
 
 def test_a_shift_deforms_nothing():

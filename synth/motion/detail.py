@@ -169,11 +169,15 @@ class Synthesis:
         done: list[np.ndarray] = []
         for i, level in enumerate(self.levels):
             H = warped[i]
-            if i > 0:  # what the coarser level changed, on top of what flowed here
-                H = H + _finer(done[-1] - warped[i - 1], H.shape[:2])
+            inland = distance_inland(ways[i])
+            if i > 0:  # what the coarser level changed, on top of what flowed here, or all it knows of what flowed in
+                H = np.where(inland[..., None] < 1, _finer(done[-1], H.shape[:2]),
+                             H + _finer(done[-1] - warped[i - 1], H.shape[:2]))
             H = initialize.reseed(H, level.exemplar, frames[i])
             bent = deformation(ways[i], state.frame[i], frames[i]) / DEFORMED
-            done.append(level.optimize(H, frames[i], level.settings.few, COHERENCE / (1 + bent**2),
+            # there is nothing to hold to in what flowed in: it takes shape on its way through the margin
+            hold = COHERENCE / (1 + bent**2) * np.minimum(inland / MARGIN, 1)
+            done.append(level.optimize(H, frames[i], level.settings.few, hold,
                                        self._boundary(i, frames[i]))[0].get())
         return done
 
@@ -207,6 +211,18 @@ class Synthesis:
         assert best is not None
         best = initialize.reseed(best, level.exemplar, frame)
         return level.optimize(best, frame, level.settings.iterations, boundary=boundary)[0].get()
+
+
+def distance_inland(way: np.ndarray) -> np.ndarray:
+    """Cells upstream from each cell to the border, (Y, X) float32, 0 where it flowed in during this frame; straight
+    back along way (Y, X, 2), which leads to the departure point."""
+    frames = np.full(way.shape[:2], np.inf, np.float32)
+    for component, position in enumerate(np.ogrid[:way.shape[0], :way.shape[1]][::-1]):
+        speed = way[..., component]
+        room = np.where(speed < 0, position, way.shape[1 - component] - 1 - position).astype(np.float32)
+        np.minimum(frames, np.divide(room, np.abs(speed), out=np.full_like(frames, np.inf), where=speed != 0),
+                   out=frames)
+    return np.where(frames < 1, np.float32(0), frames * np.maximum(np.linalg.norm(way, axis=-1), np.float32(1e-6)))
 
 
 def deformation(way: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
