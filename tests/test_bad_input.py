@@ -213,6 +213,17 @@ def test_a_scene_in_space_goes_through(home: Path) -> None:
     assert (volume.shape, volume.origin) == ((16, 16, 16), Field.centred(volume.values, 3).origin)
 
 
+def test_a_volume_as_exemplar_and_a_wind_from_a_file_go_through(home: Path) -> None:
+    random = np.random.default_rng(2)
+    for name, shape in (("swirl.vdb", (12, 16, 16, 3)), ("wind.vdb", (8, 8, 8, 3))):
+        values = random.standard_normal(shape, np.float32) * np.float32(0.1)
+        volumes.write(home / name, {"vel": Field(values, 0.25, (-4.0, -1.0, 2.0))})
+    Path("tiny.toml").write_text(windy("wind.vdb").replace('kind = "heart"', 'kind = "field"\nfile = "swirl.vdb"'))
+    assert cli.run(["bake", "tiny.toml"]) == 0
+    assert volumes.read(Path("out/tiny/fields/exemplar.vdb"))["vel"].shape == (8, 8, 8)
+    assert volumes.read(Path("out/tiny/fields/H.0001.vdb"))["vel"].values.any()
+
+
 @pytest.mark.parametrize(("old", "new", "expected"), [
     ("[coarse]", '[[views]]\nplane = "top"\n[coarse]',
      "tiny.toml: views: do not span space: none of them shows y of the local frame"),
