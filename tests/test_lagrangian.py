@@ -188,6 +188,14 @@ def test_carried_samples_flicker_less_than_a_grid():
     assert found[1] < 0.8 * found[0] and found[1] < 0.1, found
 
 
+def test_a_flow_that_rests_keeps_the_detail():
+    I, L = exemplar("circle", 16), np.zeros((40, 40, 2), np.float32)
+    synthesis = Synthesis(I, (40, 40), Settings(2), 1)
+    state = synthesis.frame(L, None)
+    before, after = synthesis.visible(state), synthesis.visible(synthesis.frame(L, state))
+    assert np.sqrt(np.mean((after - before) ** 2)) < 0.1 * np.sqrt(np.mean(before**2))
+
+
 def test_the_same_seed_gives_the_same_bits_and_a_kept_state_goes_on_alike():
     I, L = exemplar("heart", 16), wave(40)
     first, again = (Synthesis(I, (40, 40), Settings(2), 5) for _ in range(2))

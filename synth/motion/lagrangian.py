@@ -26,7 +26,7 @@ from synth import opencl
 from synth.advect import departure
 from synth.motion import detail, initialize, neighborhood
 from synth.motion.assignment import falloff, robust_weights, sample_reference
-from synth.motion.detail import COHERENCE, DEFORMED, MARGIN, Level, Settings, deformation
+from synth.motion.detail import COHERENCE, DEFORMED, MARGIN, Level, Settings, deformation, distance_inland
 
 # samples see each other this far, in cells of their level; the nearer, the more: within sqrt(NEAR) all alike
 REACH = 2.0
@@ -285,17 +285,21 @@ class Synthesis(detail.Synthesis):
     def _moved(self, motions: list[np.ndarray], frames: list[np.ndarray], state: State,
                randoms: list[np.random.Generator]) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """at, H and rank of each level of a later frame: what flowed here, corrected, held as on a grid."""
-        coarser: tuple[Cloud, np.ndarray] | None = None
+        coarser: tuple[Cloud, np.ndarray, np.ndarray] | None = None
         for i, level in enumerate(self.levels):
-            frame = frames[i]
+            frame, way = frames[i], departure(motions[i])
             samples, H, rank = carried(state.at[i], state.H[i], state.rank[i], motions[i], randoms[i])
+            inland = _at_points(np.minimum(distance_inland(way), MARGIN), samples.at)
             flowed = H
-            if coarser is not None:  # what the coarser level changed, on top of what flowed here
-                H = H + coarser[0].values_at(coarser[1], _coarser(samples.at))
+            if coarser is not None:  # what the coarser level changed, on top of what flowed here; all of what flowed in
+                above, whole, change = coarser
+                at = _coarser(samples.at)
+                H = np.where(inland[:, None] < 1, above.values_at(whole, at), H + above.values_at(change, at))
             H = _resown(samples, H, level, frame)
-            bent = _at_points(deformation(departure(motions[i]), state.frame[i], frame), samples.at) / DEFORMED
-            H = optimize(level, samples, H, rank, frame, level.settings.few, COHERENCE / (1 + bent**2))
-            coarser = samples, H - flowed
+            bent = _at_points(deformation(way, state.frame[i], frame), samples.at) / DEFORMED
+            hold = COHERENCE / (1 + bent**2) * (inland / MARGIN)
+            H = optimize(level, samples, H, rank, frame, level.settings.few, hold)
+            coarser = samples, H, H - flowed
             yield samples.at, H, rank
 
     def visible(self, state: State) -> np.ndarray:  # type: ignore[override]
