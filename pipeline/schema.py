@@ -180,8 +180,8 @@ class FileMotion(Table):
     """L from a file."""
 
     kind: Literal["file"] = key("a field, the same in every frame")
-    file: Asset = key("EXR (channels x, y) or VDB (grid vel; its middle slice, in 3-D all of it), world units per "
-                      "second; it is moved onto the domain")
+    file: Asset = key("EXR (channels x, y) or VDB (grid vel; its middle slice, in 3-D all of it), heights per second; "
+                      "it fills the domain, wherever it lies and whatever its voxels")
 
 
 class Direction(Table):
