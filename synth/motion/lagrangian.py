@@ -29,8 +29,8 @@ from synth.motion.assignment import falloff, robust_weights, sample_reference
 from synth.motion.detail import COHERENCE, DEFORMED, MARGIN, Level, Settings, deformation, distance_inland
 
 # samples see each other this far, in cells of their level; the nearer, the more: within sqrt(NEAR) all alike
-REACH = 2.0
-NEAR = 0.05
+REACH = 1.6
+NEAR = 0.02
 # of two samples nearer than this one goes; a cell without a sample this near gets one
 CROWDED = 0.4
 THIN = 0.8
@@ -375,6 +375,8 @@ def _coarser(at: np.ndarray) -> np.ndarray:
 def _resown(samples: Cloud, H: np.ndarray, level: Level, frame: np.ndarray) -> np.ndarray:
     """H (P, 2) with a whole exemplar laid into each place that has run empty, as `initialize.reseed` on a grid."""
     grid = samples.on_grid(H)
+    # between samples the finest waves are flatter, which is no emptiness
+    grid *= np.sqrt(np.mean(H**2) / max(float(np.mean(grid**2)), 1e-12))
     sown = initialize.reseed(grid, level.exemplar, frame)
     changed = (sown != grid).any(axis=-1)
     if not changed.any():
