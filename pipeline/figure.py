@@ -24,7 +24,7 @@ LABELS = {
     "input": "input", "exemplar": "exemplar *I*", "exemplar-colour": "exemplar *I*", "exemplar-arrows": "exemplar *I*",
     "coarse": "coarse motion *L*", "coarse-colour": "coarse motion *L*", "detail": "detail *H′*",
     "detail-colour": "detail *H′*", "detail-arrows": "detail *H′*",
-    "detail-divergence": "sources and sinks of *H′*", "combined": "*F* = *L* + *ωH′*",
+    "detail-divergence": "divergence of *H′*", "combined": "*F* = *L* + *ωH′*",
     "combined-colour": "*F* = *L* + *ωH′*", "result": "result",
 }
 METHODS = ("render.layout", "render.film", "render.lic")
