@@ -11,6 +11,7 @@ all, prints tables and writes out/bench.json.
     density      the density window beside SciPy
     repeat       the same bits: run after run, at any thread count, from any kernel cache
     solid        ma09 3-D: time, memory, growth, quality of both searches
+    smoke        a frame of smoke: path-traced draft, march, and Cycles
     quality      five numbers and whole motifs for every built-in exemplar, and what helped
     boundary     what flows through the wall of figure 7, and what observing it costs the texture
 """

@@ -109,9 +109,22 @@ def boundary_rows(found: dict[str, Any]) -> Iterable[Row]:
            "not said")
 
 
+def smoke_rows(found: dict[str, Any]) -> Iterable[Row]:
+    march, draft = found["march"], found["draft"]
+    yield (f"{found['what']}, march", seconds(march), "1.5 s", verdict(march["wall"] <= 1.5),
+           f"{found['error of the march']:.1%} from many paths")
+    yield (f"    draft, {found['draft, paths per pixel']} paths per pixel", seconds(draft), "15 s",
+           verdict(draft["wall"] <= 15), f"{found['error of the draft']:.1%}; not denoised "
+                                         f"{found['error of the draft, not denoised']:.1%}")
+    if "beside Cycles" in found:
+        ratio = found["beside Cycles"]["times as efficient as volpath"]
+        yield ("    volpath's time over Cycles' at equal noise", f"{ratio:.2f}", "-", "", "Blender's Cycles")
+
+
 ROWS: dict[str, Callable[[dict[str, Any]], Iterable[Row]]] = {
     "synthesis": synthesis_rows, "search": search_rows, "density": density_rows, "repeat": repeat_rows,
-    "solid": solid_rows, "potential": potential_rows, "lagrangian": lagrangian_rows, "boundary": boundary_rows}
+    "solid": solid_rows, "potential": potential_rows, "lagrangian": lagrangian_rows, "boundary": boundary_rows,
+    "smoke": smoke_rows}
 # lists of equal rows each: printed as tables of their own
 TABLES = ("quality", "solid", "potential", "lagrangian", "boundary")
 PARTS = tuple(dict.fromkeys((*ROWS, *TABLES)))

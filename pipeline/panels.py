@@ -54,7 +54,7 @@ def has_still(scene: Scene) -> bool:
 
 
 def _smoke_pictures(scene: Scene, stock: Stock, frames: list[int], method: str) -> Iterator[tuple[int, np.ndarray]]:
-    from render import smoke
+    from render import smoke, studio
 
     settings: Any = scene.render
     for frame in frames:
@@ -71,7 +71,8 @@ def _smoke_pictures(scene: Scene, stock: Stock, frames: list[int], method: str) 
                     density.values, density.voxel_size, density.origin, smoke.VolumeSettings(
                         width=settings.width, height=settings.height, spp=settings.spp, seed=scene.seed,
                         extinction=settings.extinction, bowl=settings.bowl,
-                        method="march" if method == "march" else "path", denoised=settings.denoised))
+                        method="march" if method == "march" else "path", denoised=settings.denoised,
+                        camera=studio.CAMERA if settings.elevation is None else studio.raised(settings.elevation)))
 
 
 def make_seaweed(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:

@@ -406,6 +406,8 @@ class VolumeRender(Table):
     extinction: float = key("of smoke of density 1", 110.0, "per height", gt=0, le=10000)
     bowl: Annotated[tuple[Share, Share], Strict(False)] | None = key(
         "radius and height of the bowl that the plume rises from", None, "heights")
+    elevation: float | None = key("of the camera above the horizon; none: about level with the plume", None, "degrees",
+                                  ge=0, le=85)
 
 
 class SeaweedRender(Table):

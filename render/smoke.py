@@ -221,6 +221,16 @@ def empty_stage(settings: VolumeSettings) -> march.Stage:
                                             denoised=False))
 
 
+def alone(density: np.ndarray, voxel_size: float, origin: tuple[float, float, float],
+          settings: VolumeSettings) -> np.ndarray:
+    """A density (Z, Y, X) under the lights of the studio, path-traced, with nothing else there; as of `volume`."""
+    mi = backend.mitsuba("scalar_rgb")
+    scene = _studio(mi, None)
+    del scene["backdrop"]
+    scene["smoke"] = _medium(mi, checked_density(density, 3), voxel_size, origin, settings.extinction)
+    return _photographed(mi, scene, settings)
+
+
 @functools.lru_cache(maxsize=2)
 def _empty_stage(settings: VolumeSettings) -> march.Stage:
     mi = backend.mitsuba("scalar_rgb")

@@ -75,6 +75,14 @@ BACKDROP_COLOUR: Point = (0.085, 0.092, 0.105)
 BOWL_COLOUR: Point = (0.085, 0.075, 0.070)
 
 
+def raised(elevation: float) -> Camera:
+    """The camera lifted to `elevation` degrees above the horizon of its target, as far away as before."""
+    x, y, z = CAMERA.target
+    away = float(np.linalg.norm(np.array(CAMERA.position) - np.array(CAMERA.target)))
+    angle = float(np.radians(elevation))
+    return Camera((x, y + away * float(np.sin(angle)), z + away * float(np.cos(angle))), CAMERA.target, CAMERA.fov)
+
+
 def extruded(profile: np.ndarray, half_width: float) -> Mesh:
     """The surface that a profile (N, 2) of (z, y) sweeps from x = -half_width to half_width."""
     profile = np.asarray(profile, np.float32)

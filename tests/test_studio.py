@@ -63,3 +63,12 @@ def test_the_edges_of_a_softbox_lie_in_its_face() -> None:
         assert level[1] == 0.0 and upright[1] > 0.0
         assert level @ upright == pytest.approx(0.0, abs=1e-9)
         assert level @ facing == pytest.approx(0.0, abs=1e-9) and upright @ facing == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_raised_camera_looks_at_the_same_place_from_as_far() -> None:
+    low, high = studio.CAMERA, studio.raised(60.0)
+    target = np.array(low.target)
+    assert high.target == low.target and high.fov == low.fov
+    away = np.array(high.position) - target
+    assert np.linalg.norm(away) == pytest.approx(np.linalg.norm(np.array(low.position) - target))
+    assert np.degrees(np.arcsin(away[1] / np.linalg.norm(away))) == pytest.approx(60.0)
