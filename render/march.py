@@ -32,7 +32,7 @@ from synth.advect import ROW
 STEP = 1.0  # of the rays, cells
 LEAST = 1e-3  # share of light below which a ray ends
 ACROSS = 3  # points along each edge of a lamp when it lights smoke
-SHADE_ACROSS = 6  # and when smoke shades a surface
+SHADE_ACROSS = 5  # and when smoke shades a surface
 BOUNCES = (2, 16)  # that `scattered` follows, on cells twice and four times as large: where two more change little
 MU, ETA = 0.3500212, 0.8688903  # S4: its directions are (+-MU, +-MU, +-ETA) in every order
 SLOPE, HALF_STEP = MU / ETA, 0.5 / ETA  # from plane to plane
@@ -483,7 +483,9 @@ def seen(grid: Grid, lamps: Sequence[Lamp], medium: Medium, stage: Stage) -> See
     rays = np.column_stack([unit, stage.distance.reshape(-1) / grid.voxel_size])
     looked = look(source(grid, lamps, stage.eye, medium, stage.border), shape, rays, grid.cells(stage.eye))
     surface = (stage.eye + stage.distance[..., None] * stage.rays / length).reshape(-1, 3)
-    sigma = opencl.to_device(grid.sigma)
-    shares = [shade(sigma, shape, grid.cells(surface), grid.cells(lamp.points(SHADE_ACROSS))) for lamp in lamps]
+    # shadows of large lamps are soft: half the resolution shows no less of them
+    sigma, _, half = _halved(opencl.to_device(grid.sigma), shape, opencl.zeros((*shape, 4)), 1.0)
+    coarse = Grid(grid.sigma, 2 * grid.voxel_size, grid.origin + 0.5 * grid.voxel_size)
+    shares = [shade(sigma, half, coarse.cells(surface), coarse.cells(lamp.points(SHADE_ACROSS))) for lamp in lamps]
     looked = looked.reshape(height, width, 4)
     return Seen(looked[..., :3], looked[..., 3], np.array(shares, np.float32).reshape(len(lamps), height, width))
