@@ -21,7 +21,7 @@ from synth.pyramid import pyramid
 PEAK = 300.0
 SOFTER = 8.0
 # standard deviation of lambda at the finest level, in its cells, and how many of its own cells each coarser one adds
-WIDTH = 1.5
+WIDTH = 0.8
 WIDER = 0.5
 # below this lambda changes nothing that could be seen
 LEAST = 1e-3
