@@ -87,6 +87,8 @@ def test_quick_overrides_apply_only_when_asked_for(tmp_path: Path) -> None:
      "detail.synthesize: the potential is synthesized on the grid only"),
     ("size = [32, 32]", "facing = 'directions'", "detail.facing: needs a field in space"),
     ("[render]", "[figure]\nplane = 'top'\n[render]", "figure.plane: needs a field in space"),
+    ('kind = "lit"', 'kind = "seaweed"', "render.kind: \"seaweed\" needs a field in space; detail.size is 32×32"),
+    ("[render]", "[blades]\ncover = 1.5\n[render]", "blades.cover: should be less than or equal to 1, not 1.5"),
     ("[render]", "[[density.sources]]\ncentre = [0.0, 0.1, 0.0]\n[render]",
      "density.sources[0].centre: needs a field in space"),
     ("[render]", "[[density.sources]]\nradius = 0.0\n[render]", "density.sources[0].radius[0]: should be greater"),
