@@ -165,3 +165,12 @@ def test_one_bad_voxel_is_refused_before_rendering(value: float, reason: str) ->
     density[1, 2, 3] = value
     with pytest.raises(ValueError, match=reason):
         smoke.volume(density, 0.1, (0.0, 0.0, 0.0))
+
+
+def test_smoke_alone_floats_in_the_sky_under_the_lamps() -> None:
+    density = np.ones((4, 4, 4), np.float32)
+    settings = smoke.VolumeSettings(width=16, height=20, spp=16, extinction=20.0)
+    picture = smoke.alone(density, 0.05, (-0.075, 0.4, -0.075), settings)
+    for corner in (picture[0, 0], picture[-1, -1]):
+        assert corner == pytest.approx(studio.SKY, rel=1e-5)
+    assert picture[10, 8].mean() > 3 * np.mean(studio.SKY)
