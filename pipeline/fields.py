@@ -133,10 +133,13 @@ def make_coarse(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
     if wanted.kind == "wake" and scene.stone:
         settings |= {"centre": scene.stone.centre, "radius": scene.stone.radius[0]}
     motion = coarse(wanted.kind, wanted.size[::-1], frames[-1], scene.seed, **settings)
+    before: tuple[np.ndarray, np.ndarray] | None = None
     for frame, values in enumerate(motion, start=1):
         if frame in frames:
             if scene.obstacles and wanted.kind != "wake":  # which passes its stone by itself
-                values = _past_obstacles(scene, stock, values)
+                if before is None or not np.array_equal(before[0], values):  # a steady flow is projected once
+                    before = values, _past_obstacles(scene, stock, values)
+                values = before[1]
             yield frame, Field.centred(values, scene.dimension).per_second(scene.fps)
 
 
