@@ -28,7 +28,7 @@ from synth.motion.detail import COHERENCE, DEFORMED
 from synth.motion.frames import solid_frame
 from synth.motion.search import Matcher
 
-# each level is synthesized on the domain grown by the radius of a neighbourhood, as in the plane
+# each level is synthesized on the domain grown by the radius of a 9² neighbourhood, as in the plane
 MARGIN = 4
 # mosaics tried for the first frame
 STARTS = 4
@@ -270,7 +270,6 @@ class Eye:
         self._program(True).nearest(
             average.shape[2::-1], None, *self._continued, position, legs, np.array([*grid[::-1], 1], np.int32),
             *self._basis, np.int32(begin), average, out)
-
 
     def hold(self, x: Any, prior: Any, coherence: Any) -> None:
         """The O(x) of Eq. 1: x (Z, Y, X, 4) held to `prior` by `coherence` (Z, Y, X), in place."""
