@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator
-from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from test_cli import SCENE
 
 from pipeline import stages
 from pipeline.listing import project_scenes
-from pipeline.product import Product, Stock
+from pipeline.product import Product, Stock, value_at
 from pipeline.scene import load
 from pipeline.schema import Scene
 
@@ -95,8 +94,8 @@ def test_every_key_that_a_product_reads_is_one_that_scenes_have() -> None:
     for one in (one for file in project_scenes() for one in load(file).variants.values()):
         for key in (key for made in stages.products(one).values() for key in made.reads):
             read.add(key)
-            parent = reduce(lambda value, part: getattr(value, part, None), key.split(".")[:-1], one)
-            if hasattr(parent, key.split(".")[-1]):
+            parent, _, last = key.rpartition(".")
+            if hasattr(value_at(one, parent) if parent else one, last):
                 known.add(key)
     assert read
     assert not read - known
