@@ -19,7 +19,7 @@ PACKAGES=(
     libopenvdb-tools                        # vdb_print: the tests ask OpenVDB's own tool
     ocl-icd-libopencl1 pocl-opencl-icd      # OpenCL on the CPU
     libllvm19                               # what Dr.Jit compiles kernels with; 14 to 16 abort
-    libgl1                                  # pymeshlab is linked with it
+    libgl1 libopengl0                       # pymeshlab and its plug-ins are linked with them
 )
 
 say() { echo "set-up: $*" >&2; }
