@@ -101,8 +101,8 @@ def _stride(shape: tuple[int, ...]) -> int:
     return max(1, -(-max(shape) // LATTICE))
 
 
-def _block_means(field: np.ndarray, stride: int) -> np.ndarray:
-    """Means of field (Z, Y, X[, C]) over the cells of the lattice; the last cell of an axis may be cut short."""
+def block_means(field: np.ndarray, stride: int) -> np.ndarray:
+    """Means of field (Z, Y, X[, C]) over cubes of `stride` cells; the last of an axis may be cut short."""
     for axis in range(3):
         starts = np.arange(0, field.shape[axis], stride)
         counts = np.diff(np.append(starts, field.shape[axis]))
@@ -133,8 +133,8 @@ def _prepared(L: np.ndarray, towards: np.ndarray, along: str) -> tuple[np.float3
     direction may turn over, where it vanishes.
     """
     scale, stride = _per_rms(L), _stride(L.shape[:-1])
-    e = _follow(_block_means(L, stride) * scale, along)
-    t = _block_means(towards, stride) * _per_rms(towards)
+    e = _follow(block_means(L, stride) * scale, along)
+    t = block_means(towards, stride) * _per_rms(towards)
     t = t / np.maximum(np.linalg.norm(t, axis=-1, keepdims=True), 1) + np.array([0, 0, STILL], np.float32)
     t -= np.sum(t * e, -1, keepdims=True) * e
     own = np.float32(1 / (1 + SPREAD**2))
@@ -157,7 +157,7 @@ def outward(density: np.ndarray) -> np.ndarray:
     """
     shape = density.shape
     stride = _stride(shape)
-    D = _block_means(np.asarray(density, np.float32), stride)
+    D = block_means(np.asarray(density, np.float32), stride)
     total = float(D.sum(dtype=np.float64))
     if not total > 0:
         return np.zeros((*shape, 3), np.float32)

@@ -10,6 +10,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from synth import opencl
+from synth.motion.frames import block_means
 
 RELAXATIONS = 15
 # tiles laid per exemplar area: squares that turn do not pack without gaps, and some tiles die out
@@ -170,7 +171,7 @@ def empty_blocks(H: np.ndarray, frame: np.ndarray, legs: np.ndarray, edges: tupl
     spread = np.cbrt(np.prod(edges)) / stride / np.sqrt(2 * np.pi)
     reach = int(np.ceil(np.linalg.norm(edges) / 2))
     for _ in range(max(1, int(np.prod(shape) / np.prod(edges)))):
-        energy = ndimage.gaussian_filter(_thinned(np.sum(H**2, axis=-1), stride), spread, mode="reflect")
+        energy = ndimage.gaussian_filter(block_means(np.sum(H**2, axis=-1), stride), spread, mode="reflect")
         place = np.unravel_index(int(energy.argmin()), energy.shape)
         if energy[place] >= EMPTY * mean:
             return
@@ -179,13 +180,3 @@ def empty_blocks(H: np.ndarray, frame: np.ndarray, legs: np.ndarray, edges: tupl
         ways = [np.arange(a, b, dtype=np.float32) - m for a, b, m in zip(low, high, middle, strict=True)]
         way = np.stack(np.meshgrid(*ways, indexing="ij")[::-1], axis=-1)
         yield tuple(slice(a, b) for a, b in zip(low, high, strict=True)), way @ frame[tuple(middle)]
-
-
-def _thinned(values: np.ndarray, stride: int) -> np.ndarray:
-    """Means of values (Z, Y, X) over cubes of `stride` cells; the last of an axis may be cut short."""
-    for axis in range(3):
-        starts = np.arange(0, values.shape[axis], stride)
-        counts = np.diff(np.append(starts, values.shape[axis])).astype(np.float32)
-        sums = np.add.reduceat(values, starts, axis=axis, dtype=np.float32)
-        values = sums / counts.reshape([-1 if a == axis else 1 for a in range(3)])
-    return values
