@@ -27,7 +27,7 @@ def closed(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
         meshes.meshing_repair_non_manifold_vertices()
         meshes.meshing_close_holes(maxholesize=LARGEST_HOLE, newfaceselected=False)
         meshes.meshing_re_orient_faces_coherently()
-    except pymeshlab.PyMeshLabException as error:
+    except (pymeshlab.PyMeshLabException, AttributeError) as error:  # a plug-in did not load: no such filter
         raise ValueError(f"is not watertight and cannot be mended: {str(error).splitlines()[-1]}") from error
     mended = meshes.current_mesh()
     return np.asarray(mended.vertex_matrix(), np.float64), np.asarray(mended.face_matrix(), np.int64)
