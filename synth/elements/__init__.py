@@ -11,5 +11,5 @@
     Θ        constraints of the output (Eq. 5)
     C        coarse motion and shape, D = I - C the details (§5)
 
-The modules: samples (what elements are).
+The modules: samples (what elements are), mesh (their surfaces).
 """

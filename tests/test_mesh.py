@@ -1,0 +1,238 @@
+"""Surfaces of elements: closed, their outside outside, as thick as they should be; fish swim head first and upright."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from synth.elements import mesh
+
+
+def wavy(count: int = 5, samples: int = 12, seed: int = 1) -> np.ndarray:
+    """Threads (E, S, 3) that wind."""
+    rng = np.random.Generator(np.random.Philox(key=seed))
+    s = np.linspace(0, 1, samples)
+    swing = rng.normal(0, 0.12, (count, 3, 3))
+    waves = np.stack([np.sin(2 * np.pi * s), np.cos(3 * np.pi * s), np.sin(5 * np.pi * s)], 1)
+    return np.einsum("sk,ekc->esc", waves, swing) + s[:, None] * [1.0, 0.3, 0.2] + rng.normal(0, 1, (count, 1, 3))
+
+
+def open_edges(faces: np.ndarray) -> int:
+    """Edges that do not lie between two triangles which run along it in opposite directions."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    size = edges.max() + 1
+    there, back = (np.sort(e[:, 0] * size + e[:, 1]) for e in (edges, edges[:, ::-1]))
+    assert len(np.unique(there)) == len(there), "two triangles run along an edge in the same direction"
+    return int((there != back).sum())
+
+
+def welded(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """The faces after equal points became one; triangles without area left out."""
+    _, index = np.unique(vertices.round(7), axis=0, return_inverse=True)
+    return index.ravel()[faces]
+
+
+def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
+    """What a closed surface encloses; positive if its faces are counter-clockwise from outside."""
+    a, b, c = (vertices[faces[:, k]].astype(float) for k in range(3))
+    return float((a * np.cross(b, c)).sum() / 6)
+
+
+def test_a_straight_tube_is_a_cylinder_with_round_ends() -> None:
+    line = np.linspace([0, 0, 0], [2, 0, 0], 9)[None]
+    tube = mesh.tubes(line, np.array([0.1]), np.array([[1.0, 0.5, 0.0]]), sides=48)
+    assert volume(tube.vertices, tube.faces) == pytest.approx(np.pi * 0.01 * 2 + 4 / 3 * np.pi * 0.001, rel=0.01)
+    assert tube.vertices[:, 0].min() == pytest.approx(-0.1) and tube.vertices[:, 0].max() == pytest.approx(2.1)
+    assert np.linalg.norm(tube.vertices[:, 1:], axis=1).max() == pytest.approx(0.1, abs=1e-6)
+    assert (tube.colours == [255, 128, 0]).all()
+
+
+def test_tubes_are_closed_and_their_outside_is_outside() -> None:
+    threads = wavy()
+    tubes = mesh.tubes(threads, np.full(5, 0.02), np.full((5, 3), 0.5), sides=10)
+    assert open_edges(tubes.faces) == 0
+    assert (np.diff(tubes.element) >= 0).all() and tubes.element.max() == 4
+    for e in range(5):
+        own = tubes.faces[tubes.element[tubes.faces[:, 0]] == e]
+        assert (tubes.element[own] == e).all()
+        assert volume(tubes.vertices, own) > 0
+
+
+def test_frames_do_not_twist() -> None:
+    """From ring to ring, a point of a cross section goes along the thread and not round it."""
+    threads = wavy(samples=40)
+    weights, slopes = mesh._spline(40, 32, 1.0)
+    curve, way = np.einsum("ns,esc->enc", weights, threads), np.einsum("ns,esc->enc", slopes, threads)
+    tangent = way / np.linalg.norm(way, axis=-1, keepdims=True)
+    side = mesh.carried_along(curve, tangent)
+    assert np.abs((side * tangent).sum(-1)).max() < 1e-9
+    assert np.linalg.norm(side, axis=-1) == pytest.approx(np.ones(side.shape[:2]))
+    about = (np.cross(side[:, :-1], side[:, 1:]) * tangent[:, :-1]).sum(-1)
+    assert np.abs(about.sum(1)).max() < 0.03  # of what a whole thread bends, many radians
+    assert (side[:, :-1] * side[:, 1:]).sum(-1).min() > 0.9
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.5, 1.0])
+def test_a_spline_keeps_ends_and_lines_and_goes_through_samples_if_it_should(smoothing: float) -> None:
+    weights, slopes = mesh._spline(7, 5, smoothing)
+    line = np.linspace(3.0, 9.0, 7)
+    assert weights @ line == pytest.approx(np.linspace(3, 9, 31)) and slopes @ line == pytest.approx(np.ones(31))
+    corner = np.array([0.0, 0, 0, 1, 0, 0, 0])
+    curve = weights @ corner
+    assert curve[0] == pytest.approx(0, abs=1e-12) and curve[-1] == pytest.approx(0, abs=1e-12)
+    assert curve[15] == pytest.approx(1 - smoothing / 3)
+    if smoothing == 1:
+        assert curve.min() > -1e-12  # no overshoot
+
+
+def test_threads_that_cannot_be_tubes() -> None:
+    with pytest.raises(ValueError, match="two samples"):
+        mesh.tubes(np.zeros((1, 1, 3)), np.ones(1), np.ones((1, 3)))
+    still = mesh.tubes(np.zeros((1, 4, 3)), np.ones(1), np.ones((1, 3)))  # no length: nothing to see, nothing broken
+    assert np.isfinite(still.vertices).all()
+
+
+def sheet(count: int = 3) -> np.ndarray:
+    r, c = np.meshgrid(np.linspace(0, 1, 7), np.linspace(0, 0.8, 7), indexing="ij")
+    bend = np.linspace(0.2, 0.6, count)[:, None, None]
+    return np.stack(np.broadcast_arrays(c, bend * np.sin(3 * r) * (1 + c), r), -1)
+
+
+def test_a_flat_shell_is_a_slab() -> None:
+    flat = sheet(1) * [1, 0, 1]
+    shell = mesh.shells(flat, np.array([0.01]), np.ones((1, 3)))
+    assert volume(shell.vertices, shell.faces) == pytest.approx(0.8 * 0.01, rel=1e-4)
+    assert np.ptp(shell.vertices, axis=0) == pytest.approx([0.8, 0.01, 1.0], abs=1e-6)
+
+
+def test_shells_are_closed_and_as_thick_as_they_should_be() -> None:
+    thickness = np.array([0.004, 0.01, 0.02])
+    shells = mesh.shells(sheet(), thickness, np.ones((3, 3)), fine=3)
+    for e in range(3):
+        own = shells.faces[shells.element[shells.faces[:, 0]] == e]
+        assert open_edges(welded(shells.vertices, own)) == 0
+        assert volume(shells.vertices, own) > 0
+        points = shells.vertices[shells.element == e]
+        grid = 19 * 19
+        assert np.linalg.norm(points[:grid] - points[grid:2 * grid], axis=1) == pytest.approx(
+            np.full(grid, thickness[e]), rel=1e-3)
+
+
+def straight(way: tuple[float, float, float], turn: float = 0.0, phase: float = 0.0, detail: int = 1) -> mesh.Mesh:
+    return mesh.fish(np.zeros((1, 3)), np.array([way]), np.ones(1), np.full((1, 3), 0.5), np.array([phase]),
+                     np.array([turn]), detail)
+
+
+@pytest.mark.parametrize("way", [(1.0, 0.0, 0.0), (0.0, 0.0, -2.0), (-1.0, 0.4, 1.0)])
+def test_a_fish_swims_head_first_and_upright(way: tuple[float, float, float]) -> None:
+    fish = straight(way)
+    eyes = fish.vertices[mesh._template(1).paint[:, 4] > 0].mean(0)
+    ahead = np.array(way) / np.linalg.norm(way)
+    assert eyes @ ahead > 0.2
+    assert (fish.vertices @ ahead).min() > -0.75 and (fish.vertices @ ahead).max() < 0.45
+    body = slice(0, len(mesh._body(1).points))
+    back = mesh._template(1).paint[body, 0] > 0.9
+    belly = mesh._template(1).paint[body, 2] > 0.9
+    assert (fish.vertices[body][back].mean(0) - fish.vertices[body][belly].mean(0))[1] > 0.05
+    assert fish.colours[body][back].mean() < fish.colours[body][belly].mean() - 60  # dark above, light below
+
+
+def test_fish_stay_upright_and_do_not_flip_when_they_rise() -> None:
+    rise = np.linspace(-50, 50, 101)
+    heading = np.stack([np.ones(101), rise, np.zeros(101)], 1)
+    ahead, left, up = mesh._upright(heading, np.zeros(101))
+    assert up[:, 1].min() > 0.7 and np.diff(ahead[:, 1]).min() > -1e-9
+    assert left == pytest.approx(np.tile([0.0, 0.0, -1.0], (101, 1)))
+    assert np.cross(ahead, left) == pytest.approx(up)
+    assert np.isfinite(np.stack(mesh._upright(np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]), np.zeros(2)))).all()
+
+
+@pytest.mark.parametrize("turn", [-1.2, 0.0, 1.2])
+def test_bending_does_not_change_length(turn: float) -> None:
+    for phase in (0.0, 2.0, 4.0):
+        spine, left = mesh._bent(np.array([phase]), np.array([turn]))
+        assert np.linalg.norm(np.diff(spine[0], axis=0), axis=1).sum() == pytest.approx(1)
+        assert np.linalg.norm(left[0], axis=1) == pytest.approx(np.ones(mesh.JOINTS), abs=0.02)
+        chord = np.linalg.norm(spine[0, 0] - spine[0, -1])
+        assert chord > 0.85
+        assert volume(*body_of(turn, phase)) == pytest.approx(volume(*body_of(0.0, 0.0)), rel=0.1)
+
+
+def body_of(turn: float, phase: float) -> tuple[np.ndarray, np.ndarray]:
+    return straight((1.0, 0.0, 0.0), turn, phase).vertices, mesh._body(1).faces
+
+
+def test_a_fish_that_turns_left_bends_and_leans_to_the_left() -> None:
+    spine, _ = mesh._bent(np.zeros(1), np.ones(1))
+    straight_spine, _ = mesh._bent(np.zeros(1), np.zeros(1))
+    inside = (spine - straight_spine)[0, :, 1]
+    assert inside[0] > 0.03 and inside[-1] > 0.1  # both ends lie on the inner side
+    _, left, up = mesh._upright(np.array([[1.0, 0.0, 0.0]]), np.ones(1))
+    assert up[0] @ [0.0, 0.0, -1.0] > 0.3 and left[0, 1] < -0.3
+
+
+def test_the_tail_sways_most_and_the_wave_runs_backwards() -> None:
+    phases = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+    spine, _ = mesh._bent(phases, np.zeros(64))
+    sway = np.ptp(spine[..., 1], axis=0)
+    assert sway[-1] > 3 * sway[0] and sway.min() < 0.05
+    late = [int(np.argmax(spine[:, joint, 1])) for joint in (20, 26, 32)]
+    assert all(0 < (b - a) % 64 < 32 for a, b in itertools.pairwise(late))
+
+
+def test_a_fish_is_closed_but_for_its_fins_and_small_enough_for_a_shoal() -> None:
+    body = mesh._body(1)
+    assert open_edges(body.faces) == 0
+    assert len(mesh._template(1).faces) < 600
+    assert volume(straight((1.0, 0.0, 0.0)).vertices, body.faces) > 0.005
+
+
+def test_eyes_look_outwards() -> None:
+    fish = straight((1.0, 0.0, 0.0), detail=2)
+    paint = mesh._template(2).paint[:, 4]
+    for side in (1, -1):
+        own = (paint != 0) & (np.sign(-fish.vertices[:, 2]) == side)
+        faces = fish.faces[own[fish.faces].all(1)]
+        a, b, c = (fish.vertices[faces[:, k]] for k in range(3))
+        assert (np.cross(b - a, c - a)[:, 2] * -side).sum() > 0
+
+
+def test_a_gait_read_from_a_circle() -> None:
+    """Counter-clockwise from above is to the left: one length of fish is 1/2 of the radius."""
+    rate, frames = 24.0, 96
+    angle = np.linspace(0, 2 * np.pi, frames)
+    track = np.stack([np.cos(angle), np.zeros(frames), -np.sin(angle)], 1)[:, None]
+    gait = mesh.swimming(track, np.array([0.5]), rate)
+    inner = slice(8, -8)
+    assert gait.heading[inner, 0] == pytest.approx(
+        np.stack([-np.sin(angle), np.zeros(frames), -np.cos(angle)], 1)[inner], abs=0.01)
+    assert gait.turn[inner] == pytest.approx(np.full((frames - 16, 1), 0.5), rel=0.03)
+    assert (np.diff(gait.phase, axis=0) > 0).all()
+
+
+def test_a_fish_that_rests_keeps_its_heading() -> None:
+    track = np.zeros((40, 1, 3))
+    track[:20, 0, 0] = np.linspace(-1, 0, 20)
+    gait = mesh.swimming(track, np.array([0.2]), 24.0)
+    assert gait.heading[:, 0] == pytest.approx(np.tile([1.0, 0.0, 0.0], (40, 1)), abs=1e-6)
+    still = mesh.swimming(np.zeros((5, 2, 3)), np.ones(2), 24.0)
+    assert np.isfinite(still.heading).all() and np.linalg.norm(still.heading, axis=-1) == pytest.approx(np.ones((5, 2)))
+
+
+def test_solids_lie_on_the_plane_within_their_radius() -> None:
+    place = np.array([[0.0, 0.0], [3.0, 1.0], [-2.0, 4.0], [5.0, 5.0]])
+    radius = np.array([0.5, 1.0, 0.7, 0.3])
+    solids = mesh.solids(place, radius, np.full((4, 3), 0.5), np.arange(4), np.array([0.0, 1.0, 2.0, 3.0]))
+    assert open_edges(solids.faces) == 0
+    for e in range(4):
+        own = solids.vertices[solids.element == e]
+        assert np.linalg.norm(own[:, :2] - place[e], axis=1).max() == pytest.approx(radius[e], rel=0.02)
+        assert 0 <= own[:, 2].min() < 0.03 * radius[e]
+        assert volume(solids.vertices, solids.faces[solids.element[solids.faces[:, 0]] == e]) > 0
+    with pytest.raises(ValueError, match="kind of solid"):
+        mesh.solids(place, radius, np.full((4, 3), 0.5), np.array([0, 1, 2, 9]))
+
+
+def test_an_animation_is_one_mesh_that_moves() -> None:
+    first, second = (mesh.tubes(wavy(seed=seed), np.full(5, 0.02), np.full((5, 3), 0.5)) for seed in (1, 2))
+    assert np.array_equal(first.faces, second.faces) and np.array_equal(first.element, second.element)
