@@ -7,6 +7,8 @@ In the order data passes through them:
     sheet     light through a sheet of smoke, layer by layer
     smoke     a density as a lit sheet, as ink on paper, or as a volume
     particles particles as foam on a river, obstacles as stones
+    surface   meshes, cameras and lamps as Mitsuba takes them
+    water     light under water: caustics, fog, shafts, sand
     seaweed   blades under water, by path tracing
     studio    what a volume is photographed in: camera, lights, backdrop, bowl
     backend   the one home of Mitsuba and Dr.Jit
