@@ -35,3 +35,12 @@ def test_a_gap_is_named_by_frame_and_element() -> None:
     positions[1, 2] = np.nan
     with pytest.raises(ValueError, match="frame 2, element 3 is not finite"):
         Elements(positions)
+
+
+def test_a_box_is_two_corners_and_gives_the_period() -> None:
+    elements = Elements(np.zeros((1, 2, 1, 2)), box=np.array([[1, 2], [4, 8]]))
+    assert elements.period is not None and elements.period.tolist() == [3, 6]
+    assert Elements(np.zeros((1, 2, 1, 2))).period is None
+    for box in (np.zeros((2, 2)), np.ones((2, 3)), np.array([[0, 0], [1, np.nan]])):
+        with pytest.raises(ValueError, match="a lower and an upper corner"):
+            Elements(np.zeros((1, 2, 1, 2)), box=box)

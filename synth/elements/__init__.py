@@ -12,4 +12,6 @@
     C        coarse motion and shape, D = I - C the details (§5)
 
 The modules: samples (what elements are), mesh (their surfaces).
+
+The exemplars I and coarse motions C: arrangement (points at rest).
 """

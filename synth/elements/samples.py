@@ -22,6 +22,8 @@ class Elements:
     kind       (E,) int32: which look or shape an element has
     colour     (E, 3) float32, sRGB in 0..1
     coarse     (T, E, S, D) float32 or None: C, where each sample would be without details (§5)
+    box        (2, D) float32 or None: lower and upper corner of the unit that the elements fill, where it repeats
+               toroidally; an element may leave it, its copies come in on the other side
     Raises ValueError for shapes that do not fit, or values that are not finite.
     """
 
@@ -32,6 +34,7 @@ class Elements:
     kind: np.ndarray = field(default=None)  # type: ignore[arg-type]
     colour: np.ndarray = field(default=None)  # type: ignore[arg-type]
     coarse: np.ndarray | None = None
+    box: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if self.positions.ndim != 4 or self.positions.shape[3] not in (2, 3) or 0 in self.positions.shape:
@@ -57,6 +60,11 @@ class Elements:
                          else f"element {bad[0][0] + 1}")
                 raise ValueError(f"{name}: {where} is not finite")
             object.__setattr__(self, name, value)
+        if self.box is not None:
+            box = np.ascontiguousarray(self.box, np.float32)
+            if box.shape != (2, self.dimensions) or not (np.isfinite(box).all() and (box[0] < box[1]).all()):
+                raise ValueError(f"the box is a lower and an upper corner of {self.dimensions} numbers, not {box}")
+            object.__setattr__(self, "box", box)
 
     @property
     def topology(self) -> str:
@@ -75,3 +83,8 @@ class Elements:
     @property
     def dimensions(self) -> int:
         return int(self.positions.shape[3])
+
+    @property
+    def period(self) -> np.ndarray | None:
+        """(D,) float32: the box's extents, world units; None where the elements do not repeat."""
+        return None if self.box is None else self.box[1] - self.box[0]
