@@ -12,6 +12,7 @@ in it, and on a torus: what leaves on one side comes in on the other.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -186,7 +187,7 @@ def _kinds(colour: np.ndarray) -> np.ndarray:
     return np.argsort(order, kind="stable")[kind]
 
 
-def _points(points: np.ndarray, extent: np.ndarray, size: np.ndarray, **looks: np.ndarray) -> Elements:
+def _points(points: np.ndarray, extent: np.ndarray, size: np.ndarray, **looks: Any) -> Elements:
     """One frame of points (E, D) in the unit of these extents."""
     box = np.stack([np.zeros_like(extent), extent])
     return Elements(points[None, :, None].astype(np.float32), size=size, box=box, **looks)
