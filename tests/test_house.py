@@ -26,7 +26,7 @@ HOMES = {
     "mujoco": {"synth/elements/simulation.py"},
     "pxr": {"pipeline/files/stage.py"},
     "rlic": {"render/lic.py"},
-    "threadpoolctl": {"synth/motion/neighborhood.py"},
+    "threadpoolctl": {"synth/motion/neighborhood.py", "synth/elements/assignment.py"},
     "cyclopts": {"pipeline/cli.py"},
     "pydantic": {"pipeline/schema.py", "pipeline/scene.py"},  # the tables; loading a file into them
     "rich": {"pipeline/progress.py"},

@@ -1,0 +1,240 @@
+"""The first guess of an output (ma13 §4.1, Initialization): patches of the exemplar, of whole elements over all
+frames, copied into the domain, from the most to the least constrained region.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from synth.elements.constraints import Domain
+from synth.elements.samples import Elements
+
+TRIES = 24  # patches that are looked at for each place
+CLOSE = 0.6  # of the spacing: nearer than that, an element of a patch is left out
+FILL_TRIES = 40  # points tried, for each element that is missing
+JUMP_WITHIN = 0.6  # of the exemplar's frames: a track that has come to its end goes on before this
+
+
+@dataclass(frozen=True)
+class Copied:
+    """An output as it begins.
+
+    elements  T frames
+    source    (T·E·S,) int32: the exemplar sample that each sample was copied from
+    """
+
+    elements: Elements
+    source: np.ndarray
+
+
+def points(exemplar: Elements, box: np.ndarray, domain: Domain, frames: int, radius: float, spacing: float, seed: int,
+           toroidal: bool, turn: Callable[[np.ndarray], np.ndarray] | None = None, pins: np.ndarray | None = None,
+           allowed: Callable[[np.ndarray], np.ndarray] | None = None, count: int | None = None) -> Copied:
+    """Elements of one sample each, in a domain.
+
+    box       (2, D): what the exemplar's elements fill, least and largest corner; where it is toroidal, its period
+    radius    of the neighbourhood, the size of a patch; spacing: the exemplar's nearest distance, world units
+    turn      local frames (M, D, D) at points (M, D) of the first frame
+    pins      (P, D) hard positions in the first frame
+    allowed   bits of the kinds that may stand at points (M, D)
+    count     of the elements; None: as dense as the exemplar
+    Raises ValueError for a domain smaller than a neighbourhood, or more pins than elements.
+    """
+    rng = np.random.Generator(np.random.Philox(key=seed))
+    dims = exemplar.dimensions
+    start = exemplar.positions[0, :, 0]
+    density = exemplar.count / float(np.prod(box[1] - box[0]))
+    volume = float((domain.inside > 0).sum()) * domain.cell**dims
+    expected = count or max(2, round(density * volume))
+    if volume < radius**dims:
+        raise ValueError("the domain is smaller than a neighbourhood")
+    placed = np.zeros((0, dims)) if pins is None else pins.astype(np.float64)
+    if len(placed) > expected:
+        raise ValueError(f"{len(placed)} hard positions are more than the {expected} elements the domain holds")
+    source = rng.integers(0, exemplar.count, len(placed))
+    for centre in _places(domain, radius, placed):
+        patch, elements = _patch(start, box, toroidal, centre, radius, rng, placed, domain, turn, spacing)
+        good = domain.distance(patch) > 0 if len(patch) else np.zeros(0, bool)
+        if allowed is not None and len(patch):
+            good &= (allowed(patch) & (1 << (exemplar.kind[elements] % 31))) > 0
+        patch, elements = patch[good], elements[good]
+        if len(placed) and len(patch):
+            far = cKDTree(placed).query(patch)[0] > CLOSE * spacing
+            patch, elements = patch[far], elements[far]
+        placed, source = np.vstack([placed, patch]), np.concatenate([source, elements])
+    placed, source = _counted(placed, source, expected, 0 if pins is None else len(pins), domain, exemplar, allowed,
+                              rng)
+    return _over_time(exemplar, placed, source, frames, turn)
+
+
+def _places(domain: Domain, radius: float, pins: np.ndarray) -> np.ndarray:
+    """Centres of the patches, (P, D): squares of the neighbourhood's width, the most constrained first (those with
+    hard positions, then by their distance to the border)."""
+    shape = np.array(domain.inside.shape[::-1])
+    low, high = domain.origin - domain.cell / 2, domain.origin + (shape - 0.5) * domain.cell
+    counts = np.maximum(1, np.ceil((high - low) / (2 * radius)).astype(int))
+    axes = [a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(low, high, counts, strict=True)]
+    centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(shape))
+    distance = domain.distance(centres)
+    near = distance > -radius * np.sqrt(len(shape))
+    centres, distance = centres[near], distance[near]
+    pinned = np.zeros(len(centres), bool)
+    if len(pins):
+        pinned = (np.abs(centres[:, None] - pins) <= radius).all(axis=2).any(axis=1)
+    return centres[np.lexsort((np.arange(len(centres)), distance, ~pinned))]
+
+
+def _patch(start: np.ndarray, box: np.ndarray, toroidal: bool, centre: np.ndarray, radius: float,
+           rng: np.random.Generator, placed: np.ndarray, domain: Domain,
+           turn: Callable[[np.ndarray], np.ndarray] | None, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of TRIES patches of the exemplar that which fits best at `centre`: least crowded against what is placed, and
+    with the fewest elements out of the domain. Positions (K, D), and which elements they are."""
+    frame = np.eye(len(centre)) if turn is None else turn(centre[None])[0].astype(np.float64)
+    tree = cKDTree(placed) if len(placed) else None
+    period = box[1] - box[0]
+    best, least = (np.zeros((0, len(centre))), np.zeros(0, int)), np.inf
+    for _ in range(TRIES):
+        middle = rng.uniform(box[0], box[1]) if toroidal or (period <= 2 * radius).any() else rng.uniform(
+            box[0] + radius, box[1] - radius)
+        away = start - middle
+        if toroidal:
+            away -= period * np.rint(away / period)
+        away = away @ frame.T
+        inside = (np.abs(away) <= radius).all(axis=1)
+        patch = centre + away[inside]
+        misfit = 0.0
+        if len(patch):
+            misfit += float((domain.distance(patch) < 0).mean())
+            if tree is not None:
+                distance = tree.query(patch)[0]
+                misfit += float(np.sum(np.maximum(0, 1 - distance / spacing) ** 2)) / len(patch) * 2
+        else:
+            misfit = 10.0
+        if misfit < least:
+            least, best = misfit, (patch, np.nonzero(inside)[0])
+    return best
+
+
+def _counted(placed: np.ndarray, source: np.ndarray, expected: int, held: int, domain: Domain, exemplar: Elements,
+             allowed: Callable[[np.ndarray], np.ndarray] | None, rng: np.random.Generator,
+             ) -> tuple[np.ndarray, np.ndarray]:
+    """Exactly `expected` elements: the most crowded go, and the widest gaps are filled. The first `held` stay."""
+    while len(placed) > expected:
+        distance, index = cKDTree(placed).query(placed, k=2)
+        crowd = np.where(np.arange(len(placed)) >= held, distance[:, 1], np.inf)
+        # several at once, of which no two crowd each other
+        going: list[int] = []
+        for n in np.argsort(crowd, kind="stable")[: max(1, (len(placed) - expected) // 4)]:
+            if index[n, 1] not in going:
+                going.append(int(n))
+        keep = np.setdiff1d(np.arange(len(placed)), going[: len(placed) - expected])
+        placed, source = placed[keep], source[keep]
+    shape = np.array(domain.inside.shape[::-1])
+    low, high = domain.origin - domain.cell / 2, domain.origin + (shape - 0.5) * domain.cell
+    while len(placed) < expected:
+        tries = rng.uniform(low, high, (FILL_TRIES * 8, len(shape)))
+        tries = tries[domain.distance(tries) > 0]
+        if not len(tries):
+            continue
+        best = tries[np.argmax(cKDTree(placed).query(tries)[0])] if len(placed) else tries[0]
+        kinds = np.arange(exemplar.count)
+        if allowed is not None:
+            fitting = (allowed(best[None])[0] & (1 << (exemplar.kind % 31))) > 0
+            kinds = kinds[fitting] if fitting.any() else kinds
+        placed, source = np.vstack([placed, best]), np.append(source, rng.choice(kinds))
+    return placed, source
+
+
+def _over_time(exemplar: Elements, placed: np.ndarray, source: np.ndarray, frames: int,
+               turn: Callable[[np.ndarray], np.ndarray] | None) -> Copied:
+    """Each placed element moves as the one it was copied from."""
+    element, frame = tracks(exemplar, source, frames)
+    steps = np.zeros((frames, len(placed), exemplar.dimensions))
+    if frames > 1 and exemplar.frames > 1:
+        own = exemplar.positions[:, :, 0].astype(np.float64)
+        following = np.minimum(frame[:-1] + 1, exemplar.frames - 1)
+        steps[1:] = own[following, element[:-1]] - own[frame[:-1], element[:-1]]
+        if turn is not None:
+            steps = np.einsum("nij,tnj->tni", turn(placed), steps)
+    positions = (placed + np.cumsum(steps, axis=0))[:, :, None]
+    return Copied(
+        Elements(positions, (), exemplar.rate, exemplar.size[source], exemplar.kind[source], exemplar.colour[source]),
+        (frame * exemplar.count + element).ravel().astype(np.int32))
+
+
+def tracks(exemplar: Elements, source: np.ndarray, frames: int, begin: np.ndarray | None = None,
+           ) -> tuple[np.ndarray, np.ndarray]:
+    """Which element in which frame of the exemplar each output element follows: two (T, E) int arrays.
+
+    It follows its source from frame `begin` (E,), default 0; at the exemplar's end it goes on where an element moves
+    most alike (position in details and its change), early enough to have frames ahead.
+    """
+    count = len(source)
+    element, frame = np.zeros((frames, count), int), np.zeros((frames, count), int)
+    element[0] = source
+    frame[0] = 0 if begin is None else begin
+    if exemplar.frames == 1:
+        element[:] = source
+        return element, frame
+    moved = exemplar.positions if exemplar.coarse is None else exemplar.positions - exemplar.coarse
+    state = moved.astype(np.float64)
+    if exemplar.coarse is None:  # a place in the plane is not a state: only the motion is
+        state = state * 0.0
+    pace = np.diff(moved.astype(np.float64), axis=0) * 3.0
+    early = max(1, int(exemplar.frames * JUMP_WITHIN))
+    features = np.concatenate([state[:-1], pace], axis=3).reshape(exemplar.frames - 1, exemplar.count, -1)
+    tree = cKDTree(features[:early].reshape(early * exemplar.count, -1))
+    for t in range(1, frames):
+        ended = frame[t - 1] + 1 >= exemplar.frames
+        element[t], frame[t] = element[t - 1], np.where(ended, 0, frame[t - 1] + 1)
+        if ended.any():
+            last = features[-1, element[t - 1, ended]]
+            same_kind = tree.query(last)[1]
+            element[t, ended], frame[t, ended] = same_kind % exemplar.count, same_kind // exemplar.count
+    return element, frame
+
+
+def on_coarse(exemplar: Elements, coarse: np.ndarray, frames_in: np.ndarray, frames_out: np.ndarray, neighbours: int,
+              seed: int, rate: float) -> Copied:
+    """Threads or sheets on given coarse positions: each takes the details of a whole element of the exemplar.
+
+    coarse      (T, E, S, 3): C of the output
+    frames_in   local frames of the exemplar's samples (T·E·S, 3, 3), frames_out of the output's
+    neighbours  how many elements are copied from one patch: output elements side by side take exemplar elements side
+                by side, from the same frame on
+    """
+    rng = np.random.Generator(np.random.Philox(key=seed))
+    total, count, samples = coarse.shape[:3]
+    assert exemplar.coarse is not None
+    middle = coarse[0].mean(axis=1)
+    own = exemplar.coarse[0].mean(axis=1)
+    source, begin = np.full(count, -1), np.zeros(count, int)
+    tree = cKDTree(middle)
+    latest = max(1, exemplar.frames - min(total, exemplar.frames) + 1)
+    for n in rng.permutation(count):
+        if source[n] >= 0:
+            continue
+        first, frame = int(rng.integers(exemplar.count)), int(rng.integers(max(latest, exemplar.frames // 2)))
+        source[n], begin[n] = first, frame
+        taken = {first}
+        near = np.atleast_1d(tree.query(middle[n], k=min(neighbours, count))[1])
+        for m in near:
+            if source[m] >= 0 or len(taken) == exemplar.count:
+                continue
+            apart = np.linalg.norm(own - (own[first] + middle[m] - middle[n]), axis=1)
+            apart[list(taken)] = np.inf
+            source[m], begin[m] = int(np.argmin(apart)), frame
+            taken.add(int(source[m]))
+    element, frame = tracks(exemplar, source, total, begin)
+    q = np.einsum("nji,nj->ni", frames_in, (exemplar.positions - exemplar.coarse).reshape(-1, 3)).reshape(
+        exemplar.positions.shape)
+    details = q[frame, element]
+    positions = coarse + np.einsum("nij,nj->ni", frames_out, details.reshape(-1, 3)).reshape(coarse.shape)
+    first_sample = (frame * exemplar.count + element)[..., None] * samples
+    return Copied(
+        Elements(positions, exemplar.grid, rate, exemplar.size[source], exemplar.kind[source],
+                 exemplar.colour[source], coarse), (first_sample + np.arange(samples)).ravel().astype(np.int32))
