@@ -13,5 +13,5 @@
 
 The modules: samples (what elements are), mesh (their surfaces).
 
-The exemplars I and coarse motions C: arrangement (points at rest).
+The exemplars I and coarse motions C: arrangement (points at rest), school (fish).
 """
