@@ -20,11 +20,12 @@ from pipeline import obstacles
 from pipeline.errors import BadInput
 from pipeline.files import atomic, images, pictures, volumes
 from pipeline.product import Frames, Product, Stock, value_at
+from pipeline.product import Scene as AnyScene
 from pipeline.schema import Scene
 from synth.field import Field, domain_origin
 
 
-def suffix(scene: Scene) -> str:
+def suffix(scene: AnyScene) -> str:
     """The suffix of a field."""
     return "exr" if scene.dimension == 2 else "vdb"
 
@@ -37,7 +38,7 @@ def write_field(file: Path, field: Field, scene: Scene) -> None:
         volumes.write(file, {"vel" if field.is_vector else "density": field})
 
 
-def write_velocity(file: Path, field: Field, scene: Scene) -> None:
+def write_velocity(file: Path, field: Field, scene: AnyScene) -> None:
     """Write a velocity; a volume says its unit and its rate."""
     if field.dimension == 2:
         images.write_field(file, field)
@@ -53,7 +54,7 @@ def write_detail(file: Path, field: Field, scene: Scene) -> None:
         volumes.write(file, {"vel": field}, metadata={"unit": "the exemplar's longest vector", "axes": "local frame"})
 
 
-def read_field(file: Path, scene: Scene) -> Field:
+def read_field(file: Path, scene: AnyScene) -> Field:
     """Read a field that one of these wrote; its checksum vouches for it, so it needs no child process."""
     if file.suffix != ".vdb":
         return images.read_field(file)
@@ -113,17 +114,17 @@ def _text(file: Path, key: str) -> str:
         raise BadInput(file, key, "is not an SVG document in UTF-8") from None
 
 
-def make_coarse(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
+def make_coarse(scene: AnyScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Field]]:
     """L, world units per second. A simulation is run from its start: at its resolution that costs little."""
     from synth.motion.coarse import coarse
 
     wanted: Any = scene.coarse
     if wanted.kind == "file":
         steady = foreign_field(wanted.file, "coarse.file", scene.dimension)
-        size, detail = steady.shape[::-1], scene.detail.size
-        if any(n * size[1] != detail[1] * m for n, m in zip(detail, size, strict=True)):
-            raise BadInput(wanted.file, "coarse.file", f"{'×'.join(map(str, size))} has not the shape of detail.size, "
-                                                       f"{'×'.join(map(str, detail))}")
+        size, cells = steady.shape[::-1], scene.cells
+        if any(n * size[1] != cells[1] * m for n, m in zip(cells, size, strict=True)):
+            raise BadInput(wanted.file, "coarse.file", f"{'×'.join(map(str, size))} has not the shape of the domain, "
+                                                       f"{'×'.join(map(str, cells))}")
         steady = Field.centred(steady.values, scene.dimension)
         if scene.obstacles:
             steady = Field.centred(_past_obstacles(scene, stock, steady.values), scene.dimension)
@@ -143,7 +144,7 @@ def make_coarse(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple
             yield frame, Field.centred(values, scene.dimension).per_second(scene.fps)
 
 
-def _past_obstacles(scene: Scene, stock: Stock, L: np.ndarray) -> np.ndarray:
+def _past_obstacles(scene: AnyScene, stock: Stock, L: np.ndarray) -> np.ndarray:
     """L on the cells of H, where the walls are as sharp as H will know them, with no flow through them."""
     from synth.motion.coarse import upsample
     from synth.projection import project
@@ -315,12 +316,7 @@ def products(scene: Scene) -> tuple[Product, ...]:
         name=name, stage="synth", folder="fields", suffix=_exemplar_suffix(key), animated=False,
         reads=(key, "dimension") if hasattr(value_at(scene, key), "solid") else (key,), inputs=(), methods=files,
         make=_exemplar(key), write=write_field, read=read_field) for name, key in known.items()]
-    made.append(Product(
-        name="L", stage="synth", folder="fields", suffix=suffix,
-        reads=("coarse", "seed", "fps", *(("dimension",) if scene.coarse.kind == "file" else ()),
-               *(("stone", "detail.size") if solid else ())), inputs=solid,
-        methods=("synth.motion.coarse", "synth.projection", "synth.field"), make=make_coarse, write=write_velocity,
-        read=read_field))
+    made.append(coarse_product(scene))
     if out_of_smoke:
         made.append(Product(
             name="O", stage="synth", folder="fields", suffix=suffix,
@@ -334,6 +330,17 @@ def products(scene: Scene) -> tuple[Product, ...]:
         methods=(_method(scene), "synth.motion.coarse", "synth.field"),
         make=make_detail, write=write_detail, read=read_field, memory=None if flat else detail_memory))
     return tuple(made)
+
+
+def coarse_product(scene: AnyScene) -> Product:
+    """L."""
+    solid = obstacles.inputs(scene)
+    by_file = scene.coarse is not None and scene.coarse.kind == "file"
+    return Product(
+        name="L", stage="synth", folder="fields", suffix=suffix,
+        reads=("coarse", "seed", "fps", *(("dimension",) if by_file else ()), *(("stone", "cells") if solid else ())),
+        inputs=solid, methods=("synth.motion.coarse", "synth.projection", "synth.field"), make=make_coarse,
+        write=write_velocity, read=read_field)
 
 
 def _method(scene: Scene) -> str:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.errors import BadInput
 from pipeline.files import images, meshes, pictures, volumes
-from pipeline.product import Frames, Product, Stock
-from pipeline.schema import Scene
+from pipeline.product import Frames, Product, Scene, Stock
 from synth.field import Field
 
 if TYPE_CHECKING:
@@ -30,15 +29,15 @@ def make_solid(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[
     """
     from synth import obstacle
 
-    solids = [_solid(scene, number) for number in range(len(scene.obstacles))]
+    solids = [solid(scene, wanted, f"obstacles[{number}]") for number, wanted in enumerate(scene.obstacles)]
     yield 0, Field.centred(obstacle.union(solids).distance / scene.shape[-2], scene.dimension)
 
 
-def _solid(scene: Scene, number: int) -> Obstacle:
+def solid(scene: Scene, wanted: Any, key: str) -> Obstacle:
+    """The solid of one table, whose key is blamed for a file that does not do."""
     from synth import obstacle
 
-    wanted: Any = scene.obstacles[number]
-    key = f"obstacles[{number}].file"
+    key = f"{key}.file"
     match wanted.kind:
         case "ball":
             return obstacle.ball(scene.shape, wanted.centre, wanted.radius[0])
@@ -52,10 +51,10 @@ def _solid(scene: Scene, number: int) -> Obstacle:
         case "level-set":
             return obstacle.level_set(scene.shape, volumes.read_level_set(wanted.file, wanted.grid, key))
         case "mask":
-            solid = pictures.read_grey(wanted.file, key)
+            inked = pictures.read_grey(wanted.file, key)
         case _:
-            solid = _drawing(wanted.file, key)
-    return obstacle.picture(scene.shape, solid, wanted.centre, wanted.height)
+            inked = _drawing(wanted.file, key)
+    return obstacle.picture(scene.shape, inked, wanted.centre, wanted.height)
 
 
 def _drawing(file: Path, key: str) -> np.ndarray:
@@ -82,7 +81,7 @@ def distance(scene: Scene, stock: Stock) -> np.ndarray | None:
 
 def border(scene: Scene) -> str:
     """How the motion meets the border of the domain: smoke rises in a closed box, all else flows through."""
-    return "wall" if scene.coarse.kind == "smoke" else "open"
+    return "wall" if scene.coarse and scene.coarse.kind == "smoke" else "open"
 
 
 def inputs(scene: Scene) -> tuple[tuple[str, Frames], ...]:
@@ -96,7 +95,7 @@ def products(scene: Scene) -> tuple[Product, ...]:
         return ()
     return (Product(
         name="solid", stage="synth", folder="fields", suffix=lambda s: "exr" if s.dimension == 2 else "vdb",
-        animated=False, reads=("obstacles", "detail.size"), inputs=(),
+        animated=False, reads=("obstacles", "cells"), inputs=(),
         methods=("synth.obstacle", "synth.motion.exemplar"), make=make_solid, write=write_solid, read=read_solid),)
 
 

@@ -251,7 +251,7 @@ def products(scene: Scene) -> tuple[Product, ...]:
             case _:
                 inputs = (("F", "same"),)
         if what not in ("input", "exemplar"):
-            inputs, reads = (*inputs, *obstacles.inputs(scene)), (*reads, "detail.size")
+            inputs, reads = (*inputs, *obstacles.inputs(scene)), (*reads, "cells")
         make = make_input(panel) if what == "input" else maker(panel)
         made.append(Product(
             name=panel.picture, stage="render", folder="images", suffix=suffix, reads=reads, inputs=inputs,
@@ -271,11 +271,11 @@ def _river(scene: Scene) -> list[Product]:
     solid = obstacles.inputs(scene)
     stage = Product(
         name="stage", stage="render", folder="images", suffix=suffix, animated=False,
-        reads=("render.width", "render.spp", "detail.size", "seed"), inputs=solid, methods=("render.particles",),
+        reads=("render.width", "render.spp", "cells", "seed"), inputs=solid, methods=("render.particles",),
         make=make_stage, write=write_light, read=read_light)
     beauty = Product(
         name="beauty", stage="render", folder="images", suffix=suffix,
-        reads=("render", "particles.life", "detail.size", "fps"),
+        reads=("render", "particles.life", "cells", "fps"),
         inputs=(("particles", "same"), ("stage", "once"), *solid), methods=("render.particles",), make=make_river,
         write=write_light, read=read_light)
     return [stage, beauty]

@@ -8,9 +8,13 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from pipeline.manifest import file_sha256
-from pipeline.schema import Scene
+from pipeline.elements_schema import ElementsScene
+from pipeline.schema import Scene as MotionScene
 
-Frames = Literal["same", "until", "once"]
+Scene = MotionScene | ElementsScene
+"""A scene of either kind; the functions of a product take the kind that has it."""
+
+Frames = Literal["same", "until", "every", "once"]
 
 
 class Stock(Protocol):
@@ -37,7 +41,7 @@ class Product:
     reads   dotted keys of the scene that its content depends on; the first is blamed for values that do not do
     methods modules of synth and render that compute it: their sources, and all these import, count for its key
     inputs  products it is made from, and which of their frames frame i needs: the "same", all "until" and with
-            i, or the one file there is ("once")
+            i, "every" one, or the one file there is ("once")
     make    make(scene, stock, frames): yields (frame, value) for each of `frames` (ascending), in that order
     write   write(file, value, scene); `read` is its inverse
     still   of an animated product: whether there is only the frame that the still shows
@@ -47,16 +51,16 @@ class Product:
     name: str
     stage: str
     folder: str
-    suffix: Callable[[Scene], str]
+    suffix: Callable[[Any], str]
     reads: tuple[str, ...]
     inputs: tuple[tuple[str, Frames], ...]
     methods: tuple[str, ...]
-    make: Callable[[Scene, Stock, list[int]], Iterator[tuple[int, Any]]]
-    write: Callable[[Path, Any, Scene], None]
-    read: Callable[[Path, Scene], Any]
+    make: Callable[[Any, Stock, list[int]], Iterator[tuple[int, Any]]]
+    write: Callable[[Path, Any, Any], None]
+    read: Callable[[Path, Any], Any]
     animated: bool = True
     still: bool = False
-    memory: Callable[[Scene], tuple[float, str]] | None = None
+    memory: Callable[[Any], tuple[float, str]] | None = None
 
     def file(self, scene: Scene, frame: int) -> str:
         """File name of a frame."""

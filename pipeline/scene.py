@@ -16,7 +16,7 @@ import math
 import re
 import tomllib
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -25,6 +25,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from pipeline.errors import BadInput
+from pipeline.elements_schema import ElementsScene
+from pipeline.product import Scene as AnyScene
 from pipeline.schema import Scene, ShapeObstacle, View, is_of_exemplar
 
 Raw = Mapping[str, Any]
@@ -47,7 +49,7 @@ class Scenes:
 
     file: Path
     quick: bool
-    variants: dict[str, Scene]
+    variants: dict[str, AnyScene]
 
     @property
     def name(self) -> str:
@@ -132,12 +134,12 @@ def _overridden(file: Path, raw: Raw, overrides: Overrides) -> dict[str, Any]:
     return result
 
 
-def _validated(file: Path, raw: Raw, *overrides: Overrides) -> Scene:
+def _validated(file: Path, raw: Raw, *overrides: Overrides) -> AnyScene:
     """The scene of `raw` under `overrides`, the last one winning; BadInput blames the override if it was one."""
     for table in overrides:
         raw = _overridden(file, raw, table)
     try:
-        scene = Scene.model_validate(raw, context={"folder": file.parent})
+        scene = _kind(raw).model_validate(raw, context={"folder": file.parent})
         key, reason = _fault_between_tables(scene)
     except ValidationError as error:
         key, reason = _first_fault(raw, error)
@@ -152,13 +154,18 @@ def _validated(file: Path, raw: Raw, *overrides: Overrides) -> Scene:
     raise BadInput(file, f"{overrides[-1].where}: {key}" if overrides else key, reason)
 
 
+def _kind(raw: Raw) -> type[Scene] | type[ElementsScene]:
+    """What kind of scene a file is."""
+    return ElementsScene if "elements" in raw else Scene
+
+
 def _first_fault(raw: Raw, error: ValidationError) -> tuple[str, str]:
     """Dotted key and reason of one fault: a misspelt key first, for it is often why another is missing."""
     faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     fault = faults[0]
     key = ""
     table: Any = raw
-    model: type[BaseModel] = Scene
+    model: type[BaseModel] = _kind(raw)
     field: FieldInfo | None = None
     for part in fault["loc"]:
         if isinstance(part, int):
@@ -218,9 +225,12 @@ def _did_you_mean(given: str, known: Any) -> str:
     return f"; did you mean {close[0]}?" if close else f"; known: {', '.join(known)}"
 
 
-def _fault_between_tables(scene: Scene) -> tuple[str, str]:
+def _fault_between_tables(scene: AnyScene) -> tuple[str, str]:
     """Dotted key and reason of values that are fine each and impossible together; ("", "") if all is well."""
-    for faults in (_flat_and_deep, _exemplar, _grids, _views, _obstacles, _shown):
+    checks: Sequence[Callable[[Any], Faults]] = (
+        (_flat_and_deep, _exemplar, _grids, _views, _obstacles, _shown) if isinstance(scene, Scene) else
+        (_element_kinds, _element_places, _grids, _obstacles, _shown))
+    for faults in checks:
         for key, reason in faults(scene):
             return key, reason
     return "", ""
@@ -233,8 +243,6 @@ def _flat_and_deep(scene: Scene) -> Faults:
     """What is for a field in the plane and what is for one in space."""
     detail, density, render = scene.detail, scene.density, scene.render
     size = _sized(detail.size)
-    if scene.coarse.kind != "file" and len(scene.coarse.size) != scene.dimension:
-        yield "coarse.size", f"{_sized(scene.coarse.size)} has not as many axes as detail.size, {size}"
     if scene.dimension == 2:
         need = f"needs a field in space; detail.size is {size}"
         if scene.views:
@@ -339,38 +347,44 @@ def _unseen(vectors: Sequence[Sequence[float]]) -> str:
     return (axis or "(" + ", ".join(f"{n:.2g}" for n in unit) + ")") + " of the local frame"
 
 
-def _grids(scene: Scene) -> Faults:
+def _grids(scene: AnyScene) -> Faults:
     """Grids that have to fit each other."""
-    detail = scene.detail.size
-    if scene.coarse.kind == "file":
+    cells, coarse = scene.cells, getattr(scene.coarse, "size", None)
+    if coarse is None:
         return
-    coarse = scene.coarse.size
-    if any(n * coarse[1] != detail[1] * m for n, m in zip(detail, coarse, strict=True)):
-        yield "detail.size", f"{_sized(detail)} has not the shape of coarse.size, {_sized(coarse)}"
+    where = _cells_key(scene)
+    if len(coarse) != len(cells):
+        yield "coarse.size", f"{_sized(coarse)} has not as many axes as {where}, {_sized(cells)}"
+    elif any(n * coarse[1] != cells[1] * m for n, m in zip(cells, coarse, strict=True)):
+        yield where, f"{_sized(cells)} has not the shape of coarse.size, {_sized(coarse)}"
 
 
-def _obstacles(scene: Scene) -> Faults:
+def _cells_key(scene: AnyScene) -> str:
+    return "detail.size" if isinstance(scene, Scene) else "elements.size"
+
+
+def _obstacles(scene: AnyScene) -> Faults:
     """The obstacles, and the stone that a wake needs."""
     for number, obstacle in enumerate(scene.obstacles):
         if not isinstance(obstacle, ShapeObstacle):
             continue
         if len(obstacle.centre) != scene.dimension:
             yield (f"obstacles[{number}].centre",
-                   f"has {len(obstacle.centre)} coordinates; detail.size is {_sized(scene.detail.size)}")
+                   f"has {len(obstacle.centre)} coordinates; {_cells_key(scene)} is {_sized(scene.cells)}")
         if len(obstacle.radius) not in (1, scene.dimension if obstacle.kind == "box" else 1):
             yield f"obstacles[{number}].radius", f"has {len(obstacle.radius)} numbers for a {obstacle.kind}"
-    if scene.obstacles and scene.detail.boundary and scene.detail.samples == "lagrangian":
+    if isinstance(scene, Scene) and scene.obstacles and scene.detail.boundary and scene.detail.samples == "lagrangian":
         yield "detail.samples", "samples that move do not observe a boundary: say boundary = false"
-    if scene.coarse.kind == "wake":
+    if scene.coarse is not None and scene.coarse.kind == "wake":
         if scene.dimension == 3:
-            yield "coarse.kind", f'"wake" is a flow of the plane; detail.size is {_sized(scene.detail.size)}'
+            yield "coarse.kind", f'"wake" is a flow of the plane; {_cells_key(scene)} is {_sized(scene.cells)}'
         if scene.stone is None:
             yield "coarse.kind", '"wake" needs a stone, an [[obstacles]] with kind = "ball"'
         if len(scene.coarse.lengths) != len(scene.coarse.gains):
             yield "coarse.gains", f"{len(scene.coarse.gains)} gains for {len(scene.coarse.lengths)} lengths"
 
 
-def _shown(scene: Scene) -> Faults:
+def _shown(scene: AnyScene) -> Faults:
     """What the figure shows."""
     figure = scene.figure
     if figure.frame > scene.frames:
@@ -380,7 +394,45 @@ def _shown(scene: Scene) -> Faults:
         yield "figure.labels", f"{len(figure.labels)} labels for {panels} panels"
     if "result" in figure.panels and scene.render.kind == "none":
         yield "figure.panels", 'there is no "result" with render.kind = "none"'
+    if "coarse" in figure.panels and scene.coarse is None:
+        yield "figure.panels", 'there is no "coarse" without a [coarse]'
 
+
+LOOKS = {"noodles": "noodles", "papers": "papers", "shoal": "shoal"}
+"""The [render] kind that an exemplar of elements asks for, where it asks."""
+
+
+def _element_kinds(scene: ElementsScene) -> Faults:
+    """Exemplar, coarse motion and picture of one topology, in a domain of the exemplar's dimension."""
+    exemplar, coarse, render = scene.exemplar.kind, scene.coarse, scene.render.kind
+    threads = {"noodles": ("lifted", "poured", "tracks"), "papers": ("gust", "tracks")}
+    if exemplar in threads:
+        if coarse is None or coarse.kind not in threads[exemplar]:
+            yield "coarse.kind", f'of {exemplar} is one of {", ".join(threads[exemplar])}'
+    elif exemplar != "tracks" and coarse is not None and not scene.flows:
+        yield "coarse.kind", f'"{coarse.kind}" carries threads or sheets, no {exemplar}'
+    if exemplar in LOOKS and render != LOOKS[exemplar]:
+        yield "render.kind", f'"{render}" draws no {exemplar}: say "{LOOKS[exemplar]}"'
+    flat = exemplar in ("poisson-disk", "jittered-grid", "hexagonal-grid", "dots") or render == "beads"
+    if flat and scene.dimension == 3 or not flat and scene.dimension == 2:
+        yield "elements.size", f"{_sized(scene.cells)} has not the axes of a domain of {exemplar} drawn as {render}"
+
+
+def _element_places(scene: ElementsScene) -> Faults:
+    """Domain, hard positions and sequence."""
+    wanted, synthesis = scene.elements, scene.synthesis
+    if isinstance(wanted.domain, ShapeObstacle) and len(wanted.domain.centre) != scene.dimension:
+        yield ("elements.domain.centre",
+               f"has {len(wanted.domain.centre)} coordinates; elements.size is {_sized(scene.cells)}")
+    for number, pin in enumerate(wanted.pins):
+        if len(pin.at) != scene.dimension:
+            yield f"elements.pins[{number}].at", f"has {len(pin.at)} coordinates; the domain has {scene.dimension}"
+        if pin.frame > scene.frames:
+            yield f"elements.pins[{number}].frame", f"the animation has {scene.frames} frames"
+    if synthesis.sequence == "frames" and synthesis.after:
+        yield "synthesis.after", 'is 0 with sequence = "frames": later frames are not there yet (figure 3)'
+    if wanted.along == "flow" and not scene.flows:
+        yield "elements.along", '"flow" needs a [coarse] that is a field'
 
 def _sized(size: Sequence[int]) -> str:
     """A size as the user reads it: 96×128×96."""

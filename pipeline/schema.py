@@ -488,9 +488,19 @@ class Scene(Table):
         return len(self.detail.size)
 
     @property
+    def cells(self) -> tuple[int, ...]:
+        """Of H and F, x first."""
+        return self.detail.size
+
+    @property
     def shape(self) -> tuple[int, ...]:
-        """Cells of H and F as arrays count them, (Y, X) or (Z, Y, X)."""
-        return self.detail.size[::-1]
+        """The cells as arrays count them, (Y, X) or (Z, Y, X)."""
+        return self.cells[::-1]
+
+    @property
+    def flows(self) -> bool:
+        """Whether the coarse motion is a field."""
+        return True
 
     @property
     def stone(self) -> ShapeObstacle | None:

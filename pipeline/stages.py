@@ -13,20 +13,23 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pipeline import fields, geometry, manifest, obstacles, panels, sources
+from pipeline import elements, fields, geometry, manifest, obstacles, panels, sources
 from pipeline.errors import BadInput, StorageFailed
 from pipeline.manifest import Entry, Folder
-from pipeline.product import Product
+from pipeline.product import Product, Scene
 from pipeline.progress import Progress
 from pipeline.scene import Scenes, folder_name
-from pipeline.schema import Scene
+from pipeline.schema import Scene as MotionScene
 
 VERBS = ("synth", "bake", "render", "figure")
 
 
 def products(scene: Scene) -> dict[str, Product]:
     """All products of a scene, by name, each after those it is made from."""
-    made = (*obstacles.products(scene), *fields.products(scene), *geometry.products(scene), *panels.products(scene))
+    if isinstance(scene, MotionScene):
+        made = (*obstacles.products(scene), *fields.products(scene), *geometry.products(scene), *panels.products(scene))
+    else:
+        made = (*obstacles.products(scene), *elements.products(scene))
     return {p.name: p for p in made}
 
 
@@ -89,8 +92,9 @@ class Works:
             product = self.products[variant][name]
             hashes = []
             for other, which in product.inputs:
-                if which == "until":
-                    hashes.append(self._chain(variant, other, frame))
+                if which in ("until", "every"):
+                    last = frame if which == "until" else self.scenes.variants[variant].frames
+                    hashes.append(self._chain(variant, other, last))
                 else:
                     entry = self.entry(variant, other, frame if which == "same" else 0)
                     hashes.append(entry.sha256 if entry else None)
@@ -136,7 +140,7 @@ class Works:
                     continue
                 needed, key = product.memory(scene)
                 if needed > there:
-                    size = "×".join(map(str, scene.detail.size))
+                    size = "×".join(map(str, scene.cells))
                     raise StorageFailed(f"{self.scenes.file}: {key}", f"{product.name} on {size} cells needs "
                                         f"{needed / 1e9:,.0f} GB of memory; this machine has {there / 1e9:,.0f} GB")
 
@@ -176,7 +180,9 @@ class Works:
         product, scene = self.products[variant][name], self.scenes.variants[variant]
         wanted = [f for f in product.frames(scene) if frames is None or not product.animated or f in frames]
         for other, which in product.inputs:
-            for frame in {"same": wanted, "until": range(1, max(wanted, default=0) + 1), "once": [0]}[which]:
+            needed = {"same": wanted, "until": range(1, max(wanted, default=0) + 1), "once": [0],
+                      "every": range(1, scene.frames + 1)}
+            for frame in needed[which]:
                 self.require(variant, other, frame)
         missing = self.missing(variant, name, wanted)
         if not missing:

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from synth.elements.search import difference
 
 ROUNDS = 8  # of pushing apart, at most
+SLACK = 0.02  # of the radii, by which elements are pushed farther apart than needed: else many would still touch
 
 
 def overlaps(points: np.ndarray, radius: np.ndarray, element: np.ndarray, period: np.ndarray | None = None,
@@ -41,7 +42,7 @@ def resolved(points: np.ndarray, radius: np.ndarray, element: np.ndarray, period
     """
     result = points.astype(np.float64)
     for _ in range(ROUNDS):
-        one, other, depth = overlaps(result, radius, element, period)
+        one, other, depth = overlaps(result, (1 + SLACK) * radius, element, period)
         if not len(one):
             break
         away = difference(result[other] - result[one], period).astype(np.float64)

@@ -5,7 +5,7 @@ frames, copied into the domain, from the most to the least constrained region.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -31,12 +31,11 @@ class Copied:
     source: np.ndarray
 
 
-def points(exemplar: Elements, box: np.ndarray, domain: Domain, frames: int, radius: float, spacing: float, seed: int,
-           toroidal: bool, turn: Callable[[np.ndarray], np.ndarray] | None = None, pins: np.ndarray | None = None,
+def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spacing: float, seed: int,
+           turn: Callable[[np.ndarray], np.ndarray] | None = None, pins: np.ndarray | None = None,
            allowed: Callable[[np.ndarray], np.ndarray] | None = None, count: int | None = None) -> Copied:
     """Elements of one sample each, in a domain.
 
-    box       (2, D): what the exemplar's elements fill, least and largest corner; where it is toroidal, its period
     radius    of the neighbourhood, the size of a patch; spacing: the exemplar's nearest distance, world units
     turn      local frames (M, D, D) at points (M, D) of the first frame
     pins      (P, D) hard positions in the first frame
@@ -47,6 +46,8 @@ def points(exemplar: Elements, box: np.ndarray, domain: Domain, frames: int, rad
     rng = np.random.Generator(np.random.Philox(key=seed))
     dims = exemplar.dimensions
     start = exemplar.positions[0, :, 0]
+    toroidal = exemplar.box is not None
+    box = exemplar.box if exemplar.box is not None else np.stack([start.min(axis=0), start.max(axis=0)])
     density = exemplar.count / float(np.prod(box[1] - box[0]))
     volume = float((domain.inside > 0).sum()) * domain.cell**dims
     expected = count or max(2, round(density * volume))
@@ -166,6 +167,17 @@ def _over_time(exemplar: Elements, placed: np.ndarray, source: np.ndarray, frame
         (frame * exemplar.count + element).ravel().astype(np.int32))
 
 
+def carried(start: Copied, flow: Callable[[int, np.ndarray], np.ndarray]) -> Copied:
+    """The same with each element carried by a flow besides its own motion: flow(t, points) is the way of points (M, D)
+    from frame t to the next."""
+    own = start.elements.positions.astype(np.float64)
+    positions = own.copy()
+    for t in range(1, len(own)):
+        before = positions[t - 1, :, 0]
+        positions[t, :, 0] = before + flow(t - 1, before) + own[t, :, 0] - own[t - 1, :, 0]
+    return replace(start, elements=replace(start.elements, positions=positions))
+
+
 def tracks(exemplar: Elements, source: np.ndarray, frames: int, begin: np.ndarray | None = None,
            ) -> tuple[np.ndarray, np.ndarray]:
     """Which element in which frame of the exemplar each output element follows: two (T, E) int arrays.
@@ -192,9 +204,8 @@ def tracks(exemplar: Elements, source: np.ndarray, frames: int, begin: np.ndarra
         ended = frame[t - 1] + 1 >= exemplar.frames
         element[t], frame[t] = element[t - 1], np.where(ended, 0, frame[t - 1] + 1)
         if ended.any():
-            last = features[-1, element[t - 1, ended]]
-            same_kind = tree.query(last)[1]
-            element[t, ended], frame[t, ended] = same_kind % exemplar.count, same_kind // exemplar.count
+            alike = np.asarray(tree.query(features[-1, element[t - 1, ended]])[1])
+            element[t, ended], frame[t, ended] = alike % exemplar.count, alike // exemplar.count
     return element, frame
 
 
@@ -221,8 +232,7 @@ def on_coarse(exemplar: Elements, coarse: np.ndarray, frames_in: np.ndarray, fra
         first, frame = int(rng.integers(exemplar.count)), int(rng.integers(max(latest, exemplar.frames // 2)))
         source[n], begin[n] = first, frame
         taken = {first}
-        near = np.atleast_1d(tree.query(middle[n], k=min(neighbours, count))[1])
-        for m in near:
+        for m in np.ravel(tree.query(middle[n], k=min(neighbours, count))[1]):
             if source[m] >= 0 or len(taken) == exemplar.count:
                 continue
             apart = np.linalg.norm(own - (own[first] + middle[m] - middle[n]), axis=1)

@@ -6,7 +6,7 @@ energy of Eq. 5 after each search is given back: it falls, but where Θ pulls ag
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,7 +109,7 @@ class Optimizer:
             for _ in range(self.settings.sweeps):
                 flat = assignment.relaxed(flat, terms, anchors, free)
         self.positions = flat.reshape(self.positions.shape)
-        self._correct(active)
+        self.correct(active)
         self.energies.append(energy)
         return energy
 
@@ -173,7 +173,7 @@ class Optimizer:
         if self.within.anchored and coarse is not None and self.settings.centre > 0:
             yield assignment.centred(self.within, output, coarse, self.matches, active, self.settings.centre)
 
-    def _correct(self, active: np.ndarray) -> None:
+    def correct(self, active: np.ndarray) -> None:
         """The extra solver step, and the hard constraints."""
         dims = self.positions.shape[3]
         for t in active:
@@ -188,25 +188,47 @@ class Optimizer:
         """The output as it stands."""
         return replace(self.elements, positions=self.positions.astype(np.float32))
 
+    def state(self) -> dict[str, np.ndarray]:
+        """What an interrupted run needs to go on from here with the same bits."""
+        matches = {name: getattr(self.matches, name) for name in ("sample", "apart", "slot", "neighbors")}
+        return {"positions": self.positions, "energies": np.array(self.energies), **matches}
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go on from a `state`. Raises ValueError if it is of another output."""
+        for name in ("sample", "apart", "slot", "neighbors"):
+            array = getattr(self.matches, name)
+            if state[name].shape != array.shape or state[name].dtype != array.dtype:
+                raise ValueError("the state is of another output")
+            setattr(self.matches, name, np.array(state[name]))
+        self.positions = np.array(state["positions"], np.float64).reshape(self.positions.shape)
+        self.energies = [float(energy) for energy in state["energies"]]
+
 
 def together(within: Exemplar, start: Elements, source: np.ndarray, guides: Guides, settings: Settings,
-             done: Callable[[int], None] = lambda iteration: None) -> tuple[Elements, np.ndarray]:
-    """All frames together, non-causal: the output, and its energy per sample (iterations,) at each search."""
+             kept: Mapping[str, np.ndarray] | None = None) -> Iterator[Optimizer]:
+    """All frames together, non-causal: the optimizer after each iteration; its `result` after the last.
+
+    kept   the `state` of an interrupted run after some iteration
+    """
     optimizer = Optimizer(within, start, source, guides, settings)
     every = np.arange(start.frames)
-    optimizer._correct(every)
-    for iteration in range(settings.iterations):
+    if kept is None:
+        optimizer.correct(every)
+    else:
+        optimizer.restore(kept)
+    for _ in range(len(optimizer.energies), settings.iterations):
         optimizer.iterate(every, start.frames)
-        done(iteration)
-    return optimizer.result(), np.array(optimizer.energies)
+        yield optimizer
 
 
 def by_frames(within: Exemplar, first: Elements, source: np.ndarray, frames: int, guides: Guides, settings: Settings,
-              done: Callable[[int], None] = lambda frame: None) -> tuple[Elements, np.ndarray]:
-    """Frame by frame, causal (§4.1, Sequencing): each frame begins as the one before, carried on.
+              kept: Mapping[str, np.ndarray] | None = None) -> Iterator[Optimizer]:
+    """Frame by frame, causal (§4.1, Sequencing): each begins as the one before, carried on. The optimizer after each
+    frame; its `result` after the last.
 
     first   one frame: the output as it is initialized; source (E·S,) what each sample was copied from
-    Returns the output of `frames` frames, and the energy per sample (frames, iterations).
+    kept    the `state` of an interrupted run after some frame
+    Raises ValueError for a neighbourhood with frames after its own.
     """
     if within.shape.after:
         raise ValueError("frame by frame, a neighbourhood has no frames after its own")
@@ -214,14 +236,15 @@ def by_frames(within: Exemplar, first: Elements, source: np.ndarray, frames: int
     sources = np.full(frames * first.count * first.positions.shape[2], -1, np.int32)
     sources[: len(source)] = source
     optimizer = Optimizer(within, start, sources, guides, settings)
-    for frame in range(frames):
+    if kept is not None:
+        optimizer.restore(kept)
+    for frame in range(len(optimizer.energies) // settings.iterations, frames):
         if frame:
             _advected(optimizer, frame)
-        optimizer._correct(np.array([frame]))
+        optimizer.correct(np.array([frame]))
         for _ in range(settings.iterations):
             optimizer.iterate(np.array([frame]), frame + 1)
-        done(frame)
-    return optimizer.result(), np.array(optimizer.energies).reshape(frames, -1)
+        yield optimizer
 
 
 def _advected(optimizer: Optimizer, frame: int) -> None:

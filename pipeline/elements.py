@@ -1,0 +1,368 @@
+"""What the stages make of a scene of elements (ma13).
+
+synth   in fields/: the exemplar I and the output O as tracks (.npz), the coarse motion L where it is a field
+bake    in geometry/: a mesh of each frame (PLY), and the whole animation as one USD file
+render  in images/: the elements, their exemplar, their coarse motion
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline import fields, looks, obstacles
+from pipeline.elements_schema import ElementsScene
+from pipeline.files import atomic, pictures, tracks
+from pipeline.product import Frames, Product, Stock
+from synth.elements.samples import Elements
+from synth.field import domain_origin
+
+MANY = 200  # threads or sheets, where the scene does not say how many
+NEIGHBOURS = 9  # threads that are copied side by side
+
+
+def make_exemplar(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
+    """I, by procedure or from a file; points and fish scaled so that their nearest distance is elements.spacing."""
+    example = _exemplar(scene)
+    if example.topology == "none":
+        example = _scaled(example, scene.elements.spacing)
+    yield 0, example
+
+
+def _exemplar(scene: ElementsScene) -> Elements:
+    from synth.elements import arrangement, byhand, school, simulation
+
+    wanted: Any = scene.exemplar
+    match wanted.kind:
+        case "poisson-disk":
+            return arrangement.poisson_disk((wanted.across,) * 2, seed=scene.seed)
+        case "jittered-grid":
+            return arrangement.jittered_grid((wanted.across,) * 2, jitter=wanted.jitter, seed=scene.seed)
+        case "hexagonal-grid":
+            return arrangement.hexagonal_grid((wanted.across, wanted.across + wanted.across % 2))
+        case "dots":
+            return arrangement.drawn(pictures.read_foreign(wanted.file, "exemplar.file")[::-1])
+        case "shoal":
+            made = {"homogeneous": school.homogeneous, "crossing": school.crossing, "mixed": school.mixed}
+            return made[wanted.behaviour](wanted.count, frames=wanted.frames, rate=scene.fps, seed=scene.seed)[0]
+        case "noodles":
+            kind = {"simulated": simulation.noodles, "jagged": byhand.jagged_noodles}[wanted.style]
+            return kind(frames=wanted.frames, rate=scene.fps, seed=scene.seed)
+        case "papers":
+            kind = {"simulated": simulation.papers, "folded": byhand.folded_papers}[wanted.style]
+            return kind(frames=wanted.frames, rate=scene.fps, seed=scene.seed)
+    return tracks.read_foreign(wanted.file, "exemplar.file", rate=wanted.rate or scene.fps,
+                               dimensions=scene.dimension)
+
+
+def _scaled(example: Elements, spacing: float) -> Elements:
+    from synth.elements import neighborhood
+
+    factor = spacing / neighborhood.spacing(example.positions, _period(example))
+    return replace(example, positions=example.positions * factor, size=example.size * factor,
+                   box=None if example.box is None else example.box * factor)
+
+
+def _period(example: Elements) -> np.ndarray | None:
+    return None if example.box is None else (example.box[1] - example.box[0]).astype(np.float64)
+
+
+def make_elements(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Any]]:
+    """O, and its energy after each search (Eq. 5). An interrupted run goes on after the last whole iteration, or frame
+    by frame after the last whole frame: same bits."""
+    example = stock.read("exemplar")
+    within, start, guides = (_of_points if example.topology == "none" else _on_coarse)(scene, stock, example)
+    settings = _settings(scene)
+    kept = _kept(stock)
+    from synth.elements import synthesis
+
+    if scene.synthesis.sequence == "together":
+        run = synthesis.together(within, start.elements, start.source, guides, settings, kept)
+    else:
+        run = synthesis.by_frames(within, start.elements, start.source, scene.frames, guides, settings, kept)
+    optimizer = None
+    for optimizer in run:
+        _keep(stock, optimizer.state())
+    if optimizer is None:  # the run was interrupted after its last iteration, before its file was whole
+        raise RuntimeError("nothing was left to do")
+    yield 0, (optimizer.result(), np.array(optimizer.energies))
+
+
+def _settings(scene: ElementsScene) -> Any:
+    from synth.elements.synthesis import Settings
+
+    wanted = scene.synthesis
+    return Settings(iterations=wanted.iterations, n=wanted.matches, coherent=wanted.search == "k-coherence",
+                    solver=wanted.assignment, centre=wanted.hold, hybrid=wanted.hybrid)
+
+
+def _shape(scene: ElementsScene, spacing: float) -> Any:
+    from synth.elements.neighborhood import Shape
+
+    wanted = scene.synthesis
+    radius = wanted.neighborhood * spacing
+    # Table 2: σ_p is measured by the neighbourhood; Eq. 10 divides squares of distances by it
+    sigma = wanted.sigma_p * radius**2 if wanted.sigma_p else np.inf
+    return Shape(radius, wanted.before, wanted.after, wanted.whole, sigma=sigma)
+
+
+def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[Any, Any, Any]:
+    """The exemplar for the search, the first guess and the guides of elements that are points in a domain."""
+    from synth.elements import initialize, search
+    from synth.elements.constraints import Constraints
+    from synth.elements.synthesis import Guides
+
+    wanted = scene.elements
+    if example.dimensions != scene.dimension:
+        raise ValueError(f"the exemplar has {example.dimensions} dimensions, the domain {scene.dimension}")
+    within = search.exemplar(example, _shape(scene, wanted.spacing), period=_period(example))
+    domain = _domain(scene, stock)
+    flow, turn, allowed = _flow(scene, stock), _turn(scene, stock), _allowed(scene)
+    pins = [pin for pin in wanted.pins if pin.frame == 1]
+    together = scene.synthesis.sequence == "together"
+    start = initialize.points(
+        example, domain, scene.frames if together else 1, within.shape.radius, wanted.spacing, scene.seed,
+        turn=None if turn is None else lambda points: turn(0, points),
+        pins=np.array([pin.at for pin in pins]) if pins else None,
+        allowed=None if allowed is None else lambda points: allowed(0, points), count=wanted.count or None)
+    if together and flow is not None:
+        start = initialize.carried(start, flow)
+    margin = 0.5 * wanted.spacing if scene.obstacles or wanted.domain else 0.0
+    return within, start, Guides(
+        Constraints(domain, margin, _pins(scene, start.elements.positions)), flow, turn, allowed=allowed,
+        period=_toroidal(scene))
+
+
+def _toroidal(scene: ElementsScene) -> np.ndarray | None:
+    """The period of the output, 0 along axes that end."""
+    if not scene.elements.toroidal:
+        return None
+    return np.array([scene.cells[0] / scene.cells[1], *[0.0] * (scene.dimension - 1)])
+
+
+def _domain(scene: ElementsScene, stock: Stock) -> Any:
+    """Where elements may be: the domain's rectangle and the shape in it, less the obstacles; heights."""
+    from synth.elements.constraints import Domain
+
+    cell = 1.0 / scene.cells[1]
+    origin = np.array(domain_origin(scene.shape))
+    inside = np.full(scene.shape, np.inf)
+    for axis, count in enumerate(scene.shape):
+        if scene.elements.toroidal and axis == scene.dimension - 1:
+            continue
+        at = (np.arange(count) + 0.5) * cell
+        inside = np.minimum(inside, np.minimum(at, count * cell - at).reshape(
+            [-1 if n == axis else 1 for n in range(scene.dimension)]))
+    if scene.elements.domain is not None:
+        shape = obstacles.solid(scene, scene.elements.domain, "elements.domain").distance
+        inside = np.minimum(inside, -shape * cell)
+    if scene.obstacles:
+        inside = np.minimum(inside, stock.read("solid").values)
+    if not (inside > 0).any():
+        raise ValueError("the domain is empty: obstacles fill it, or its shape lies outside")
+    return Domain(inside.astype(np.float32), cell, origin)
+
+
+def _flow(scene: ElementsScene, stock: Stock) -> Any:
+    """How far points are carried from a frame to the next, heights; None without a flow."""
+    if not scene.flows:
+        return None
+
+    def flow(t: int, points: np.ndarray) -> np.ndarray:
+        return _sampled(scene, stock.read("L", min(t + 1, scene.frames)).values, points) / scene.fps
+
+    return flow
+
+
+def _sampled(scene: ElementsScene, values: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """A field of the domain (…, D) at points (M, D), linearly between its cells."""
+    from scipy import ndimage
+
+    at = (points - np.array(domain_origin(values.shape[:-1]))) * values.shape[-3]
+    if scene.elements.toroidal:
+        at[:, 0] = np.mod(at[:, 0], values.shape[-2])
+    return np.stack([ndimage.map_coordinates(values[..., d], at[:, ::-1].T, order=1, mode="nearest")
+                     for d in range(scene.dimension)], axis=-1)
+
+
+def _turn(scene: ElementsScene, stock: Stock) -> Any:
+    """The orientation field: local frames at points; None where nothing is turned."""
+    from synth.elements.orientation import along_directions
+
+    match scene.elements.along:
+        case "exemplar":
+            return None
+        case "flow":
+            return lambda t, points: along_directions(
+                _sampled(scene, stock.read("L", min(t + 1, scene.frames)).values, points))
+    centre = np.array([0.0, 0.5, 0.0][: scene.dimension])
+
+    def circling(t: int, points: np.ndarray) -> np.ndarray:
+        away = points - centre
+        round_ = np.zeros_like(away)
+        round_[:, 0], round_[:, 1] = -away[:, 1], away[:, 0]
+        return along_directions(round_)
+
+    return circling
+
+
+def _allowed(scene: ElementsScene) -> Any:
+    """Which kinds may stand where, as bits; None where all may everywhere."""
+    if not scene.elements.selections:
+        return None
+    from scipy import ndimage
+
+    maps = [pictures.read_grey(s.file, f"elements.selections[{n}].file")[::-1] > 0.5
+            for n, s in enumerate(scene.elements.selections)]
+    bits = [sum(1 << kind for kind in s.kinds) for s in scene.elements.selections]
+    width = scene.cells[0] / scene.cells[1]
+
+    def allowed(t: int, points: np.ndarray) -> np.ndarray:
+        found = np.zeros(len(points), np.int64)
+        for bright, kinds in zip(maps, bits, strict=True):
+            rows, columns = bright.shape
+            at = [points[:, 1] * rows - 0.5, (points[:, 0] / width + 0.5) * columns - 0.5]
+            inside = ndimage.map_coordinates(bright.astype(np.uint8), at, order=0, mode="nearest") > 0
+            found |= np.where(inside, kinds, 0)
+        others = (1 << 31) - 1
+        for kinds in bits:
+            others &= ~kinds
+        return np.where(found > 0, found, others).astype(np.int32)
+
+    return allowed
+
+
+def _pins(scene: ElementsScene, positions: np.ndarray) -> Any:
+    """The hard positions, each for the element that is nearest to it in its frame and has none there yet."""
+    from synth.elements.constraints import Pins
+
+    if not scene.elements.pins:
+        return None
+    taken: set[tuple[int, int]] = set()
+    chosen = []
+    for pin in scene.elements.pins:
+        frame = min(pin.frame, len(positions)) - 1
+        away = np.linalg.norm(positions[frame, :, 0] - np.array(pin.at), axis=1)
+        away[[n for f, n in taken if f == pin.frame]] = np.inf
+        taken.add((pin.frame, int(np.argmin(away))))
+        chosen.append(int(np.argmin(away)))
+    return Pins(np.array([pin.frame - 1 for pin in scene.elements.pins]), np.array(chosen),
+                np.array([pin.at for pin in scene.elements.pins]))
+
+
+def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[Any, Any, Any]:
+    """The exemplar for the search, the first guess and the guides of threads or sheets on coarse positions."""
+    from synth.elements import initialize, neighborhood, orientation, search
+    from synth.elements.constraints import Constraints
+    from synth.elements.synthesis import Guides
+
+    if example.coarse is None:
+        from synth.elements import decomposition
+
+        example = decomposition.with_coarse(example)
+    assert example.coarse is not None
+    coarse = stock.read("coarse").positions
+
+    def frames_of(positions: np.ndarray) -> np.ndarray:
+        if example.topology == "thread":
+            return orientation.along_threads(positions)
+        return orientation.on_sheets(positions, example.grid)
+
+    inner, outer = frames_of(example.coarse), frames_of(coarse)
+    spacing = neighborhood.spacing(example.positions)
+    within = search.exemplar(example, _shape(scene, spacing), inner)
+    neighbours = NEIGHBOURS if example.topology == "thread" else 1
+    start = initialize.on_coarse(example, coarse, inner, outer, neighbours, scene.seed, scene.fps)
+    return within, start, Guides(Constraints(), frames=outer)
+
+
+def make_coarse(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
+    """C of threads or sheets, as many as the output has."""
+    from synth.elements import simulation
+
+    wanted: Any = scene.coarse
+    example = stock.read("exemplar")
+    count = scene.elements.count or MANY
+    if wanted.kind == "tracks":
+        foreign = tracks.read_foreign(wanted.file, "coarse.file", rate=scene.fps, fewest_elements=1)
+        if foreign.grid != example.grid:
+            raise ValueError(f"coarse.file has a grid {foreign.grid} for an element, the exemplar {example.grid}")
+        yield 0, foreign
+        return
+    kind = {"lifted": simulation.lifted, "poured": simulation.poured, "gust": simulation.gust}[wanted.kind]
+    positions = kind(count, example, frames=scene.frames, rate=scene.fps, seed=scene.seed)
+    looks_of = np.arange(len(positions[0])) % example.count
+    yield 0, Elements(positions, example.grid, scene.fps, example.size[looks_of], example.kind[looks_of],
+                      example.colour[looks_of])
+
+
+STATE = "elements.state.npz"
+
+
+def _keep(stock: Stock, state: dict[str, np.ndarray]) -> None:
+    with atomic.replacing(stock.work / STATE) as temporary, temporary.open("wb") as content:
+        np.savez(content, allow_pickle=False, **{"key": np.array(stock.key(0)), **state})
+
+
+def _kept(stock: Stock) -> dict[str, np.ndarray] | None:
+    """The state of an interrupted run of the same key; None if there is none, or a crash of the machine damaged it."""
+    try:
+        with (stock.work / STATE).open("rb") as file, np.load(file, allow_pickle=False) as kept:
+            return dict(kept) if str(kept["key"]) == stock.key(0) else None
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def write_tracks(file: Path, elements: Elements, scene: ElementsScene) -> None:
+    """Write elements."""
+    tracks.write(file, elements)
+
+
+def write_output(file: Path, made: tuple[Elements, np.ndarray], scene: ElementsScene) -> None:
+    """Write the output; its energies lie beside the tracks as the array `energy`."""
+    tracks.write(file, made[0], energy=made[1])
+
+
+def read_tracks(file: Path, scene: ElementsScene) -> Elements:
+    """Read elements."""
+    return tracks.read(file)
+
+
+def _npz(scene: ElementsScene) -> str:
+    return "npz"
+
+
+METHODS = ("synth.elements.synthesis", "synth.elements.initialize", "synth.elements.orientation",
+           "synth.elements.decomposition")
+
+
+def products(scene: ElementsScene) -> tuple[Product, ...]:
+    """The exemplar, the coarse motion, the output; and what is made of them to be looked at."""
+    solid = obstacles.inputs(scene)
+    example = Product(
+        name="exemplar", stage="synth", folder="fields", suffix=_npz, animated=False,
+        reads=("exemplar", "elements.spacing", "seed", "fps"), inputs=(),
+        methods=("synth.elements.arrangement", "synth.elements.school", "synth.elements.simulation",
+                 "synth.elements.byhand"), make=make_exemplar, write=write_tracks, read=read_tracks)
+    made = [example]
+    coarse: tuple[tuple[str, Frames], ...] = ()
+    if scene.flows:
+        made.append(fields.coarse_product(scene))
+        # all frames of the flow at once: the one file of the output depends on each
+        coarse = (("L", "every"),)
+    elif scene.coarse is not None:
+        made.append(Product(
+            name="coarse", stage="synth", folder="fields", suffix=_npz, animated=False,
+            reads=("coarse", "elements.count", "frames", "seed", "fps"), inputs=(("exemplar", "once"),),
+            methods=("synth.elements.simulation",), make=make_coarse, write=write_tracks, read=read_tracks))
+        coarse = (("coarse", "once"),)
+    made.append(Product(
+        name="elements", stage="synth", folder="fields", suffix=_npz, animated=False,
+        reads=("elements", "synthesis", "frames", "seed", "fps"), inputs=(("exemplar", "once"), *coarse, *solid),
+        methods=METHODS, make=make_elements, write=write_output, read=read_tracks))
+    return (*made, *looks.products(scene))
