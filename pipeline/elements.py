@@ -121,12 +121,12 @@ def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
     if example.dimensions != scene.dimension:
         raise ValueError(f"the exemplar has {example.dimensions} dimensions, the domain {scene.dimension}")
     within = search.exemplar(example, _shape(scene, wanted.spacing), period=_period(example))
-    domain = _domain(scene, stock)
+    region = domain(scene, stock)
     flow, turn, allowed = _flow(scene, stock), _turn(scene, stock), _allowed(scene)
     pins = [pin for pin in wanted.pins if pin.frame == 1]
     together = scene.synthesis.sequence == "together"
     start = initialize.points(
-        example, domain, scene.frames if together else 1, within.shape.radius, wanted.spacing, scene.seed,
+        example, region, scene.frames if together else 1, within.shape.radius, wanted.spacing, scene.seed,
         turn=None if turn is None else lambda points: turn(0, points),
         pins=np.array([pin.at for pin in pins]) if pins else None,
         allowed=None if allowed is None else lambda points: allowed(0, points), count=wanted.count or None)
@@ -134,7 +134,7 @@ def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
         start = initialize.carried(start, flow)
     margin = 0.5 * wanted.spacing if scene.obstacles or wanted.domain else 0.0
     return within, start, Guides(
-        Constraints(domain, margin, _pins(scene, start.elements.positions)), flow, turn, allowed=allowed,
+        Constraints(region, margin, _pins(scene, start.elements.positions)), flow, turn, allowed=allowed,
         period=_toroidal(scene))
 
 
@@ -145,7 +145,7 @@ def _toroidal(scene: ElementsScene) -> np.ndarray | None:
     return np.array([scene.cells[0] / scene.cells[1], *[0.0] * (scene.dimension - 1)])
 
 
-def _domain(scene: ElementsScene, stock: Stock) -> Any:
+def domain(scene: ElementsScene, stock: Stock) -> Any:
     """Where elements may be: the domain's rectangle and the shape in it, less the obstacles; heights."""
     from synth.elements.constraints import Domain
 

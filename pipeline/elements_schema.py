@@ -156,7 +156,6 @@ class BeadsRender(Table):
 
     kind: Literal["beads"] = key("beads on paper")
     width: int = key("of the picture", 800, "pixels", ge=16, le=LARGEST)
-    height: int = key("of the picture", 800, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
     radius: float = key("of a bead of the exemplar's commonest size", 0.42, "spacings", gt=0, le=10)
 
@@ -168,6 +167,8 @@ class ShoalRender(Table):
     width: int = key("of the picture", 960, "pixels", ge=16, le=LARGEST)
     height: int = key("of the picture", 540, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 128, ge=1, le=65536)
+    speed: float = key("at which the shoal swims along x, as the picture follows it", 2.2, "spacings per second", ge=0,
+                       le=1000)
 
 
 class NoodlesRender(Table):
@@ -198,6 +199,7 @@ class ElementsFigure(Table):
                                                                       min_length=1)
     labels: Annotated[tuple[str, ...], Strict(False)] = key(
         "below the panels, *italics* between asterisks; none: their usual ones", ())
+    inset: bool = key("the exemplar in a corner of the result", False)
     columns: int = key("panels in a row; 0: all", 0, ge=0, le=64)
     panel: int = key("width of a panel", 640, "pixels", ge=16, le=LARGEST)
     frame: int = key("the frame the still shows; 0: the last", 0, ge=0, le=100000)

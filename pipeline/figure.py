@@ -7,15 +7,16 @@ that panel stands once for each variant; with several panels, each variant has a
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from pipeline import manifest, panels, sources
+from pipeline.elements_schema import ElementsScene
 from pipeline.files import pictures, video
-from pipeline.product import Product
+from pipeline.product import Product, Scene
 from pipeline.progress import Progress
-from pipeline.schema import Scene, is_of_exemplar
+from pipeline.schema import is_of_exemplar
 
 if TYPE_CHECKING:
     from pipeline.stages import Works
@@ -27,6 +28,7 @@ LABELS = {
     "detail-divergence": "divergence of *H′*", "combined": "*F* = *L* + *ωH′*",
     "combined-colour": "*F* = *L* + *ωH′*", "result": "result",
 }
+INSET = 0.3  # of a panel's width
 METHODS = ("render.layout", "render.film", "render.lic")
 
 
@@ -62,9 +64,10 @@ def _key(works: Works, frames: Any, still: bool = False) -> str:
     hashes = []
     for variant, panel in _places(works):
         product = _product(works, variant, panel, still)
-        for frame in dict.fromkeys(_frame(product.animated, works.scenes.variants[variant], f) for f in frames):
-            entry = works.require(variant, product.name, frame)
-            hashes.append(entry.sha256)
+        scene = works.scenes.variants[variant]
+        inset = ["exemplar-picture"] if getattr(scene.figure, "inset", False) else []
+        for frame in dict.fromkeys(_frame(product.animated, scene, f) for f in frames):
+            hashes += [works.require(variant, name, frame).sha256 for name in [product.name, *inset]]
     kinds = [scene.render.kind for scene in works.scenes.variants.values()]
     names = list(works.scenes.variants)
     fps = next(iter(works.scenes.variants.values())).fps
@@ -122,17 +125,37 @@ def _panel(works: Works, variant: str, panel: panels.Shown, frame: int, still: b
     product = _product(works, variant, panel, still)
     file = works.file(variant, product.name, _frame(product.animated, scene, frame))
     light = product.read(file, scene)
-    filmic = panel.panel == "result" and scene.render.kind != "ink"
     width = _width(scene, panel)
-    shown = layout.fitted(film.developed(light, "filmic" if filmic else "straight"), width)
+    shown = layout.fitted(film.developed(light, _tone(scene, panel)), width)
     legend = lic.wheel(width // 6) if panel.style == "colour" else None
-    return layout.Panel(shown, label, legend=legend)
+    return layout.Panel(shown, label, inset=_inset(works, variant, panel, frame), legend=legend)
+
+
+def _tone(scene: Scene, panel: panels.Shown) -> Literal["filmic", "straight"]:
+    """How light becomes display values: pictures of things as film does, pictures of fields as they were drawn."""
+    if isinstance(scene, ElementsScene):
+        return "straight" if panel.panel == "coarse" and scene.flows else "filmic"
+    return "filmic" if panel.panel == "result" and scene.render.kind != "ink" else "straight"
+
+
+def _inset(works: Works, variant: str, panel: panels.Shown, frame: int) -> np.ndarray | None:
+    """The exemplar, in a corner of the result."""
+    from render import film, layout
+
+    scene = works.scenes.variants[variant]
+    if not isinstance(scene, ElementsScene) or not scene.figure.inset or panel.panel != "result":
+        return None
+    product = works.products[variant]["exemplar-picture"]
+    light = product.read(works.file(variant, product.name, _frame(product.animated, scene, frame)), scene)
+    return layout.fitted(film.developed(light, "filmic"), round(INSET * scene.figure.panel))
 
 
 def _width(scene: Scene, panel: panels.Shown) -> int:
     """Pixels across a panel: figure.panel, but an exemplar is no higher than a result that is wider than high."""
     render: Any = scene.render
     whole = scene.figure.panel
+    if isinstance(scene, ElementsScene):
+        return whole // 2 if panel.panel == "exemplar" else whole
     if not is_of_exemplar(panel.panel) or "result" not in scene.figure.panels or not hasattr(render, "height"):
         return whole
     return min(whole, round(whole * render.height / render.width))

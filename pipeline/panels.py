@@ -17,6 +17,7 @@ from pipeline import geometry, obstacles
 from pipeline.fields import LOCAL_FRAME, facing
 from pipeline.files import images, pictures
 from pipeline.product import Frames, Product, Stock, value_at
+from pipeline.product import Scene as AnyScene
 from pipeline.schema import Scene, is_of_exemplar
 
 ARROWS = 9  # across a picture
@@ -116,10 +117,12 @@ def make_river(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[
 
 @dataclass(frozen=True)
 class Shown:
-    """A panel of the figure: what the scene calls it, and which exemplar it is of where there are several."""
+    """A panel of the figure: what the scene calls it, which exemplar it is of where there are several, and how it is
+    drawn where the scene does not say."""
 
     panel: str
     exemplar: str = "exemplar"
+    usual: str = "lines"
 
     @property
     def view(self) -> str:
@@ -128,8 +131,8 @@ class Shown:
 
     @property
     def style(self) -> str:
-        """Lines, colour, arrows or divergence."""
-        return self.panel.partition("-")[2] or "lines"
+        """Lines, colour, arrows or divergence; elements have a picture."""
+        return self.panel.partition("-")[2] or self.usual
 
     @property
     def picture(self) -> str:
@@ -141,9 +144,10 @@ class Shown:
         return named if what == "input" else f"{named}-{self.style}"
 
 
-def shown(scene: Scene) -> list[Shown]:
+def shown(scene: AnyScene) -> list[Shown]:
     """The panels of the scene's figure, from left to right."""
-    return [Shown(panel, name) for panel in scene.figure.panels
+    usual = "lines" if isinstance(scene, Scene) else "picture"
+    return [Shown(panel, name, usual) for panel in scene.figure.panels
             for name in (scene.exemplars if is_of_exemplar(panel) else ["exemplar"])]
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from pipeline.manifest import file_sha256
 from pipeline.elements_schema import ElementsScene
+from pipeline.manifest import file_sha256
 from pipeline.schema import Scene as MotionScene
 
 Scene = MotionScene | ElementsScene
@@ -45,6 +45,7 @@ class Product:
     make    make(scene, stock, frames): yields (frame, value) for each of `frames` (ascending), in that order
     write   write(file, value, scene); `read` is its inverse
     still   of an animated product: whether there is only the frame that the still shows
+    export  made for other programs: nothing of ours reads it
     memory  bytes that make takes at its peak, an estimate from above, and the key that decides it; None: little
     """
 
@@ -60,6 +61,7 @@ class Product:
     read: Callable[[Path, Any], Any]
     animated: bool = True
     still: bool = False
+    export: bool = False
     memory: Callable[[Any], tuple[float, str]] | None = None
 
     def file(self, scene: Scene, frame: int) -> str:

@@ -23,9 +23,11 @@ import numpy as np
 from pipeline import stages
 from pipeline.errors import BadInput
 from pipeline.files import atomic, images
+from pipeline.product import Scene
 from pipeline.progress import Progress
 from pipeline.scene import load
-from pipeline.schema import PROJECT_SCENES, Scene
+from pipeline.schema import PROJECT_SCENES
+from synth.elements.samples import Elements
 
 RECORD = "reference.json"
 PROOF = "proof.exr"
@@ -75,7 +77,7 @@ def contents(works: stages.Works) -> Iterator[Made]:
     for variant, products in works.products.items():
         scene = works.scenes.variants[variant]
         for product in products.values():
-            if product.stage not in ("synth", "bake"):
+            if product.stage not in ("synth", "bake") or product.export:
                 continue
             for frame in product.frames(scene):
                 file = works.file(variant, product.name, frame)
@@ -105,9 +107,9 @@ def proof_settings(render: Any) -> Any:
     if render.kind == "volume":
         height = round(render.height * width / render.width)
         small |= {"height": height, "spp": PROOF_SAMPLES, "denoised": False}
-    if render.kind == "seaweed":
+    if render.kind in ("seaweed", "shoal", "noodles", "papers"):
         small |= {"height": round(render.height * width / render.width), "spp": PROOF_SAMPLES}
-    if render.kind == "particles":
+    if render.kind in ("particles", "beads"):
         small |= {"spp": PROOF_SAMPLES}
     return render.model_copy(update=small)
 
@@ -137,6 +139,8 @@ class _Stock:
 
 def _read(works: stages.Works, variant: str, product: str, file: Path) -> np.ndarray:
     value = works.products[variant][product].read(file, works.scenes.variants[variant])
+    if isinstance(value, Elements):
+        return value.positions.reshape(len(value.positions), -1)
     if isinstance(value, dict):  # a mesh or points: all their numbers, in a square that a page can show
         numbers = np.concatenate([np.ravel(value[name]).astype(np.float32) for name in sorted(value)])
         side = math.isqrt(len(numbers) - 1) + 1
@@ -146,7 +150,7 @@ def _read(works: stages.Works, variant: str, product: str, file: Path) -> np.nda
 
 def made_with(kind: str) -> dict[str, str]:
     """The versions that a picture of this [render] kind depends on."""
-    if kind in ("volume", "seaweed", "particles"):
+    if kind not in ("lit", "ink"):
         from render import backend
 
         return {"llvm": "none", **backend.versions("scalar_rgb")}  # a scalar variant does without

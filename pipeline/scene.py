@@ -24,8 +24,8 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from pipeline.errors import BadInput
 from pipeline.elements_schema import ElementsScene
+from pipeline.errors import BadInput
 from pipeline.product import Scene as AnyScene
 from pipeline.schema import Scene, ShapeObstacle, View, is_of_exemplar
 
@@ -414,7 +414,7 @@ def _element_kinds(scene: ElementsScene) -> Faults:
     if exemplar in LOOKS and render != LOOKS[exemplar]:
         yield "render.kind", f'"{render}" draws no {exemplar}: say "{LOOKS[exemplar]}"'
     flat = exemplar in ("poisson-disk", "jittered-grid", "hexagonal-grid", "dots") or render == "beads"
-    if flat and scene.dimension == 3 or not flat and scene.dimension == 2:
+    if (flat and scene.dimension == 3) or (not flat and scene.dimension == 2):
         yield "elements.size", f"{_sized(scene.cells)} has not the axes of a domain of {exemplar} drawn as {render}"
 
 

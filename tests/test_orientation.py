@@ -16,7 +16,7 @@ def helix(turns: float) -> np.ndarray:
     s, t = np.linspace(0, 1, 40), np.linspace(0, 1, 5)[:, None]
     x, y = np.cos(2 * np.pi * turns * s + t), np.sin(2 * np.pi * turns * s + t)
     one = np.stack([x, y, np.broadcast_to(3 * s, x.shape)], axis=-1)
-    return np.stack([one, one + [3, 0, 0]], axis=1)
+    return np.stack([one, one + np.array([3, 0, 0])], axis=1)
 
 
 def test_along_threads() -> None:

@@ -14,8 +14,8 @@ from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import cg
 from threadpoolctl import threadpool_limits
 
-from synth.elements.search import Exemplar, Matches, Output, _at_offsets, tied_falloff
 from synth.elements.samples import Elements
+from synth.elements.search import Exemplar, Matches, Output, _at_offsets, tied_falloff
 
 TOLERANCE = 1e-4  # relative residual of the conjugate gradients
 MOST_ITERATIONS = 200

@@ -34,7 +34,7 @@ class Domain:
 
     def slope(self, points: np.ndarray) -> np.ndarray:
         """Unit vectors towards the inside at points, (M, D)."""
-        gradient = [self._sampled(g, points) for g in np.gradient(self.inside.astype(np.float64))][::-1]
+        gradient = [self._sampled(g, points) for g in list(np.gradient(self.inside.astype(np.float64)))][::-1]
         direction = np.stack(gradient, axis=-1)
         return direction / np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-9)
 

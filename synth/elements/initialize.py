@@ -232,7 +232,7 @@ def on_coarse(exemplar: Elements, coarse: np.ndarray, frames_in: np.ndarray, fra
         first, frame = int(rng.integers(exemplar.count)), int(rng.integers(max(latest, exemplar.frames // 2)))
         source[n], begin[n] = first, frame
         taken = {first}
-        for m in np.ravel(tree.query(middle[n], k=min(neighbours, count))[1]):
+        for m in np.ravel(tree.query(middle[n], k=min(neighbours, count))[1]).tolist():
             if source[m] >= 0 or len(taken) == exemplar.count:
                 continue
             apart = np.linalg.norm(own - (own[first] + middle[m] - middle[n]), axis=1)

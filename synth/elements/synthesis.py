@@ -7,11 +7,11 @@ energy of Eq. 5 after each search is given back: it falls, but where Θ pulls ag
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from synth.elements import assignment, collision, search
+from synth.elements import assignment, collision
 from synth.elements.assignment import Anchors
 from synth.elements.constraints import Constraints
 from synth.elements.samples import Elements
@@ -59,7 +59,7 @@ class Guides:
     period   (D,) of a toroidal output, 0 along axes that end
     """
 
-    constraints: Constraints = Constraints()
+    constraints: Constraints = field(default_factory=Constraints)
     flow: Flow | None = None
     turn: Turn | None = None
     frames: np.ndarray | None = None

@@ -1,0 +1,211 @@
+"""How elements are looked at (ma13): in geometry/ their meshes, frame by frame as PLY and all as one USD file; in
+images/ the output, its exemplar and its coarse motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline import obstacles
+from pipeline.elements_schema import ElementsScene
+from pipeline.files import images, meshes
+from pipeline.product import Frames, Product, Stock
+from synth.elements.mesh import Mesh
+from synth.elements.samples import Elements
+
+INSET = 0.6  # of the result's paths per pixel are enough for a small picture
+MARGIN = 0.02  # of a height round the domain that beads lie in
+
+
+def mesh_of(scene: ElementsScene, elements: Elements, frame: int) -> Mesh:
+    """The elements of a frame, from 0, as one mesh, world units."""
+    from synth.elements import mesh
+
+    match scene.render.kind:
+        case "beads":
+            typical = float(np.median(elements.size))
+            radius = elements.size / typical * scene.render.radius * scene.elements.spacing
+            return mesh.solids(elements.positions[frame, :, 0], radius, elements.colour)
+        case "shoal":
+            gait = mesh.swimming(swum(scene, elements), elements.size, elements.rate, scene.seed)
+            return mesh.fish(elements.positions[frame, :, 0], gait.heading[frame], elements.size, elements.colour,
+                             gait.phase[frame], gait.turn[frame])
+        case "noodles":
+            return mesh.tubes(elements.positions[frame], elements.size, elements.colour)
+    rows, columns = elements.grid
+    return mesh.sheets(elements.positions[frame].reshape(elements.count, rows, columns, 3), elements.colour)
+
+
+def swum(scene: ElementsScene, elements: Elements) -> np.ndarray:
+    """Tracks (T, E, 3) of fish through water that stands still: their domain swims along x."""
+    render: Any = scene.render
+    track = elements.positions[:, :, 0].astype(np.float64)
+    track[:, :, 0] += (render.speed * scene.elements.spacing / elements.rate * np.arange(len(track)))[:, None]
+    return track
+
+
+def make_mesh(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+    """The meshes, as `meshes.write` takes them."""
+    elements = stock.read("elements")
+    for frame in frames:
+        found = mesh_of(scene, elements, frame - 1)
+        yield frame, {"vertices": found.vertices, "faces": found.faces, "colours": found.colours}
+
+
+def write_mesh(file: Path, mesh: dict[str, np.ndarray], scene: ElementsScene) -> None:
+    """Write a mesh."""
+    meshes.write(file, **mesh)
+
+
+def read_mesh(file: Path, scene: ElementsScene) -> dict[str, np.ndarray]:
+    """Read a mesh that `write_mesh` wrote."""
+    return meshes.read_own(file)
+
+
+def make_stage(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
+    """The elements, for one USD file of the whole animation."""
+    yield 0, stock.read("elements")
+
+
+def write_stage(file: Path, elements: Elements, scene: ElementsScene) -> None:
+    """Write the animation: points and curves as such, fish as meshes, sheets as shells with their thickness."""
+    from pipeline.files import stage
+    from synth.elements import mesh
+
+    def fish(frame: int) -> dict[str, Any]:
+        return {"fish": mesh_of(scene, elements, frame - 1)}
+
+    def sheets(frame: int) -> dict[str, Any]:
+        surface = elements.positions[frame - 1].reshape(elements.count, *elements.grid, 3)
+        return {"sheets": mesh.shells(surface, elements.size, elements.colour)}
+
+    stage.write(file, elements, {"shoal": fish, "papers": sheets}.get(scene.render.kind))
+
+
+def read_stage(file: Path, scene: ElementsScene) -> bytes:
+    """The file's content."""
+    return file.read_bytes()
+
+
+def make_beauty(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The output."""
+    for frame in frames:
+        yield frame, _picture(scene, stock.read("mesh", frame), frame, _ground(scene, stock), scene.render.width,
+                              scene.render.spp)
+
+
+def _picture(scene: ElementsScene, mesh: dict[str, np.ndarray], frame: int, ground: Any, width: int, spp: int,
+             inset: bool = False) -> np.ndarray:
+    from render import beads, noodles, papers, shoal
+
+    render: Any = scene.render
+    if render.kind == "beads":
+        return beads.picture(**mesh, ground=ground, settings=beads.Settings(width=width, spp=spp, seed=scene.seed))
+    height = round(render.height * width / render.width)
+    if inset:
+        height = width
+    how: dict[str, Any] = {"width": width, "height": height, "spp": spp, "seed": scene.seed}
+    if render.kind == "shoal":
+        look: Any = shoal
+        how["time"] = frame / scene.fps
+    else:
+        look = noodles if render.kind == "noodles" else papers
+    made: np.ndarray = (look.inset if inset else look.picture)(**mesh, settings=look.Settings(**how))
+    return made
+
+
+def _ground(scene: ElementsScene, stock: Stock) -> Any:
+    """What beads lie on."""
+    if scene.render.kind != "beads":
+        return None
+    from render.beads import Ground
+
+    from pipeline.elements import domain
+
+    found = domain(scene, stock)
+    inside = np.argwhere(found.inside > 0)[:, ::-1]
+    low, high = found.origin + found.cell * inside.min(axis=0), found.origin + found.cell * inside.max(axis=0)
+    plain = scene.elements.domain is None and not scene.obstacles
+    margin = 0.0 if scene.elements.toroidal or plain else MARGIN
+    low, high = low - found.cell / 2 - margin, high + found.cell / 2 + margin
+    return Ground(tuple(low), tuple(high), None if plain else found.inside, found.cell, tuple(found.origin))
+
+
+def make_exemplar_picture(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The exemplar, in the same light; one that is shorter than the animation begins again."""
+    from render.beads import Ground
+
+    example = stock.read("exemplar")
+    ground = None
+    if scene.render.kind == "beads":
+        corners = example.box if example.box is not None else np.stack(
+            [example.positions.min(axis=(0, 1, 2)), example.positions.max(axis=(0, 1, 2))])
+        ground = Ground(tuple(corners[0]), tuple(corners[1]))
+    seen: dict[int, np.ndarray] = {}
+    for frame in frames:
+        at = (frame - 1) % example.frames
+        if at not in seen:
+            found = mesh_of(scene, example, at)
+            mesh = {"vertices": found.vertices, "faces": found.faces, "colours": found.colours}
+            seen = {at: _picture(scene, mesh, frame, ground, scene.figure.panel // 2,
+                                 max(1, round(INSET * scene.render.spp)), inset=True)}
+        yield frame, seen[at]
+
+
+def make_coarse_picture(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The coarse motion: elements without details, or the lines of a flow."""
+    if scene.flows:
+        from render import film, lic
+
+        for frame in frames:
+            yield frame, film.decoded(lic.picture(stock.read("L", frame).values, scene.figure.panel, scene.seed))
+        return
+    coarse = stock.read("coarse")
+    for frame in frames:
+        found = mesh_of(scene, coarse, frame - 1)
+        mesh = {"vertices": found.vertices, "faces": found.faces, "colours": found.colours}
+        yield frame, _picture(scene, mesh, frame, None, scene.figure.panel, scene.render.spp)
+
+
+def write_light(file: Path, picture: np.ndarray, scene: ElementsScene) -> None:
+    """Write a linear picture (h, w, 3) in half floats."""
+    images.write_picture(file, picture, half=True)
+
+
+def read_light(file: Path, scene: ElementsScene) -> np.ndarray:
+    """Read a picture that `write_light` wrote."""
+    return images.read_picture(file)
+
+
+def products(scene: ElementsScene) -> tuple[Product, ...]:
+    """The meshes, the USD file, and the pictures that the figure shows."""
+    solid = obstacles.inputs(scene)
+    shape = ("synth.elements.mesh",)
+    mesh_keys = ("render.kind", "render.radius", "render.speed", "elements.spacing", "seed")
+    ground = ("elements.domain", "elements.size", "elements.toroidal")
+    made = [
+        Product(name="mesh", stage="bake", folder="geometry", suffix=lambda s: "ply", reads=mesh_keys,
+                inputs=(("elements", "once"),), methods=shape, make=make_mesh, write=write_mesh, read=read_mesh),
+        Product(name="animation", stage="bake", folder="geometry", suffix=lambda s: "usdc", animated=False,
+                reads=mesh_keys, inputs=(("elements", "once"),), methods=shape, make=make_stage, write=write_stage,
+                read=read_stage, export=True),
+        Product(name="beauty", stage="render", folder="images", suffix=lambda s: "exr",
+                reads=("render", "seed", "fps", *ground), inputs=(("mesh", "same"), *solid),
+                methods=(f"render.{scene.render.kind}",), make=make_beauty, write=write_light, read=read_light)]
+    look = (f"render.{scene.render.kind}", *shape)
+    pictures: dict[str, tuple[Any, tuple[tuple[str, Frames], ...], tuple[str, ...]]] = {
+        "exemplar": (make_exemplar_picture, (("exemplar", "once"),), look),
+        "coarse": (make_coarse_picture, (("L", "same") if scene.flows else ("coarse", "once"),),
+                   ("render.lic",) if scene.flows else look)}
+    shown = {*scene.figure.panels, *(("exemplar",) if scene.figure.inset else ())}
+    for name, (make, inputs, methods) in pictures.items():
+        if name in shown:
+            made.append(Product(
+                name=f"{name}-picture", stage="render", folder="images", suffix=lambda s: "exr",
+                reads=("render", "figure.panel", "elements.spacing", "seed", "fps"), inputs=inputs, methods=methods,
+                make=make, write=write_light, read=read_light))
+    return tuple(made)
