@@ -10,6 +10,10 @@ In the order data passes through them:
     surface   meshes, cameras and lamps as Mitsuba takes them
     water     light under water: caustics, fog, shafts, sand
     seaweed   blades under water, by path tracing
+    shoal     fish in a cube of water
+    noodles   threads as noodles on a plate
+    papers    sheets as paper in the air
+    beads     particles of the plane as beads on paper, past obstacles
     studio    what a volume is photographed in: camera, lights, backdrop, bowl
     backend   the one home of Mitsuba and Dr.Jit
     march     light carried through a volume without noise: the picture of an animation

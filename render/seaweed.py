@@ -42,7 +42,7 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settin
     sunlight = water.caustics(settings.time, settings.seed)
     scene = mi.load_dict({
         "type": "scene",
-        "sensor": surface.sensor(mi, settings.camera, settings.width, settings.height),
+        "sensor": surface.sensor(mi, settings.camera, settings.width, settings.height, "independent"),
         "sun": water.sun(mi, sunlight),
         "sky": water.sky(mi, WATER),
         "sand": water.floor(mi),

@@ -71,6 +71,7 @@ RIM = Softbox((2.5, 2.0, -2.2), (0.0, 0.5, 0.0), (1.0, 1.8), (14.0, 18.0, 24.0),
 LAMPS = {"key": KEY, "rim": RIM}
 SKY: Point = (0.055, 0.066, 0.085)  # radiance of the dim light from everywhere
 SKY_SHARE = 0.15
+FILLED = 0.80  # share of a picture that `placed` fills
 BACKDROP_COLOUR: Point = (0.085, 0.092, 0.105)
 BOWL_COLOUR: Point = (0.085, 0.075, 0.070)
 
@@ -81,6 +82,25 @@ def raised(elevation: float) -> Camera:
     away = float(np.linalg.norm(np.array(CAMERA.position) - np.array(CAMERA.target)))
     angle = float(np.radians(elevation))
     return Camera((x, y + away * float(np.sin(angle)), z + away * float(np.cos(angle))), CAMERA.target, CAMERA.fov)
+
+
+def placed(vertices: np.ndarray, low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) -> np.ndarray:
+    """Vertices (N, 3) moved and scaled so that a box from `low` to `high` (3,) fills the middle of a picture.
+
+    aspect  width of the picture over its height
+    All frames of an animation with the same box are placed alike.
+    """
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    ahead = np.array(camera.target) - np.array(camera.position)
+    away = float(np.linalg.norm(ahead))
+    right = np.cross(ahead, [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, ahead / away)
+    view = 2 * away * np.tan(np.radians(camera.fov) / 2)
+    # the widest and the highest that the box looks
+    wide, tall = (float(np.abs(axis) @ (high - low)) for axis in (right, up))
+    scale = FILLED * view / max(wide / aspect, tall, 1e-9)
+    return ((vertices - (low + high) / 2) * scale + np.array(camera.target)).astype(np.float32)
 
 
 def extruded(profile: np.ndarray, half_width: float) -> Mesh:

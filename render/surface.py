@@ -8,6 +8,8 @@ import numpy as np
 
 from render import studio
 
+SAMPLER = "multijitter"  # a quarter of the variance of independent paths, and less on what is lit evenly
+
 
 def shape(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray,
           bsdf: dict[str, Any]) -> Any:
@@ -26,6 +28,11 @@ def shape(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, colours: 
     return made
 
 
+def plain(mi: Any, name: str, mesh: studio.Mesh, bsdf: dict[str, Any]) -> Any:
+    """A mesh of the studio, in one colour."""
+    return shape(mi, name, mesh.vertices, mesh.faces, np.ones((len(mesh.vertices), 3)), bsdf)
+
+
 def normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Unit normals (N, 3) float32 of the vertices: of the triangles round each, by their area."""
     a, b, c = (vertices[faces[:, corner]].astype(np.float64) for corner in range(3))
@@ -34,15 +41,22 @@ def normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-30)).astype(np.float32)
 
 
-def sensor(mi: Any, camera: studio.Camera, width: int, height: int) -> dict[str, Any]:
-    """The camera: a box filter, so that pixels share no paths."""
+def sensor(mi: Any, camera: studio.Camera, width: int, height: int, sampler: str = SAMPLER) -> dict[str, Any]:
+    """The camera, a long lens."""
     return {
         "type": "perspective", "fov": camera.fov, "fov_axis": "y",
         "to_world": mi.ScalarTransform4f().look_at(
             origin=list(camera.position), target=list(camera.target), up=[0, 1, 0]),
+        **film(width, height, sampler),
+    }
+
+
+def film(width: int, height: int, sampler: str = SAMPLER) -> dict[str, Any]:
+    """What a camera holds: a film with the box filter, so that pixels share no paths, and a sampler of paths."""
+    return {
         "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
                  "component_format": "float32", "rfilter": {"type": "box"}},
-        "sampler": {"type": "independent"},
+        "sampler": {"type": sampler},
     }
 
 

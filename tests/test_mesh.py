@@ -118,6 +118,16 @@ def test_shells_are_closed_and_as_thick_as_they_should_be() -> None:
             np.full(grid, thickness[e]), rel=1e-3)
 
 
+def test_a_sheet_lies_between_the_sides_of_its_shell() -> None:
+    one, two = mesh.sheets(sheet(), np.ones((3, 3)), fine=3), mesh.shells(sheet(), np.full(3, 0.01), np.ones((3, 3)), 3)
+    grid = 19 * 19
+    for e in range(3):
+        points = two.vertices[two.element == e]
+        assert one.vertices[one.element == e] == pytest.approx((points[:grid] + points[grid:2 * grid]) / 2, abs=1e-6)
+    with pytest.raises(ValueError, match="two rows"):
+        mesh.sheets(np.zeros((1, 1, 7, 3)), np.ones((1, 3)))
+
+
 def straight(way: tuple[float, float, float], turn: float = 0.0, phase: float = 0.0, detail: int = 1) -> mesh.Mesh:
     return mesh.fish(np.zeros((1, 3)), np.array([way]), np.ones(1), np.full((1, 3), 0.5), np.array([phase]),
                      np.array([turn]), detail)

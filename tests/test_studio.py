@@ -72,3 +72,13 @@ def test_a_raised_camera_looks_at_the_same_place_from_as_far() -> None:
     away = np.array(high.position) - target
     assert np.linalg.norm(away) == pytest.approx(np.linalg.norm(np.array(low.position) - target))
     assert np.degrees(np.arcsin(away[1] / np.linalg.norm(away))) == pytest.approx(60.0)
+
+
+def test_a_placed_box_fills_the_middle_of_the_picture() -> None:
+    low, high = np.array([3.0, -1.0, 2.0]), np.array([5.0, 0.0, 2.0])
+    camera = studio.Camera(position=(0.0, 1.0, 4.0), target=(0.0, 1.0, 0.0), fov=30.0)
+    corners = studio.placed(np.stack([low, high]), low, high, camera, 1.5)
+    view = 2 * 4 * np.tan(np.radians(15.0))
+    assert corners.mean(0) == pytest.approx(camera.target, abs=1e-6)
+    assert np.ptp(corners[:, 0]) == pytest.approx(studio.FILLED * 1.5 * view)  # twice as wide as high: width decides
+    assert np.ptp(corners[:, 1]) == pytest.approx(studio.FILLED * 0.75 * view)

@@ -1,7 +1,7 @@
 """Surfaces of elements: threads as tubes, sheets as shells, fish that bend, and solids for particles in the plane.
 
     tubes     threads, round and smooth, with rounded ends
-    shells    sheets with a thickness
+    sheets    sheets of one layer; shells: with a thickness
     swimming  which way fish look on their tracks, where their tail is in its beat, how they turn
     fish      bodies with fins and eyes, bent by their beat and their turns
     solids    particles of the plane as beads, discs, stars and leaves that lie on it
@@ -168,30 +168,42 @@ def _tube_faces(rings: int, sides: int) -> np.ndarray:
     return np.concatenate([body, start, end])
 
 
-def shells(positions: np.ndarray, thickness: np.ndarray, colour: np.ndarray, fine: int = 4) -> Mesh:
-    """Sheets with two sides and a rim, through a bicubic spline of their samples.
+def sheets(positions: np.ndarray, colour: np.ndarray, fine: int = 4) -> Mesh:
+    """Sheets of one layer, to be drawn from both sides, through a bicubic spline of their samples.
 
     positions  (E, R, C, 3), R and C ≥ 2: samples of each sheet, by rows and columns
-    thickness  (E,), colour (E, 3) sRGB in [0, 1]
+    colour     (E, 3) sRGB in [0, 1]
     fine       points from one sample to the next
+    """
+    middle, _ = _fitted(positions, fine)
+    return _assembled(middle.reshape(len(middle), -1, 3), _grid_faces(*middle.shape[1:3]), np.asarray(colour))
+
+
+def shells(positions: np.ndarray, thickness: np.ndarray, colour: np.ndarray, fine: int = 4) -> Mesh:
+    """Sheets with two sides and a rim; positions, colour and fine as for `sheets`, thickness (E,).
+
     The rim has vertices of its own, so that its edges are sharp; where they coincide the shell is closed.
     """
-    count, rows, columns = positions.shape[:3]
-    if min(rows, columns) < 2:
-        raise ValueError("a sheet has two rows and two columns or more")
-    down, down_slope = _spline(rows, fine, 0.0)
-    along, along_slope = _spline(columns, fine, 0.0)
-
-    def fitted(by_row: np.ndarray, by_column: np.ndarray) -> np.ndarray:
-        return np.einsum("rp,epqc,sq->ersc", by_row, positions, by_column, optimize=True)
-
-    middle = fitted(down, along)
-    normal = _unit(np.cross(fitted(down_slope, along), fitted(down, along_slope)))
+    middle, normal = _fitted(positions, fine)
+    count, rows, columns = middle.shape[:3]
     half = 0.5 * np.asarray(thickness, float)[:, None, None, None] * normal
     upper, lower = ((middle + way * half).reshape(count, -1, 3) for way in (1, -1))
-    loop = _border(len(down), len(along))
+    loop = _border(rows, columns)
     vertices = np.concatenate([upper, lower, lower[:, loop], upper[:, loop]], 1)
-    return _assembled(vertices, _shell_faces(len(down), len(along)), np.asarray(colour))
+    return _assembled(vertices, _shell_faces(rows, columns), np.asarray(colour))
+
+
+def _fitted(positions: np.ndarray, fine: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points (E, rows, columns, 3) of smooth sheets, and the unit normals there."""
+    if min(positions.shape[1:3]) < 2:
+        raise ValueError("a sheet has two rows and two columns or more")
+    down, down_slope = _spline(positions.shape[1], fine, 0.0)
+    along, along_slope = _spline(positions.shape[2], fine, 0.0)
+
+    def product(by_row: np.ndarray, by_column: np.ndarray) -> np.ndarray:
+        return np.einsum("rp,epqc,sq->ersc", by_row, positions, by_column, optimize=True)
+
+    return product(down, along), _unit(np.cross(product(down_slope, along), product(down, along_slope)))
 
 
 def _border(rows: int, columns: int) -> np.ndarray:

@@ -1,0 +1,147 @@
+"""Particles of the plane as beads on white paper, photographed from straight above; obstacles stand on it.
+
+`picture` path-traces solids with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row first. An
+exemplar's inset is the same picture of its own ground. `render.film` tones it ("filmic").
+
+World units; x to the right and y up in the picture, z towards the camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+from render import backend, film, surface
+
+SLANT = (-0.42, 0.62, 1.0)  # towards the lamp: from the upper left
+LAMP = 0.34  # edge of the lamp over its distance: how soft shadows are
+AWAY = 18.0  # how far it is, in heights of the picture: the paper is lit evenly
+LAMP_LIGHT = (3.05, 2.93, 2.74)  # irradiance of a surface that faces it
+AIR = (0.30, 0.315, 0.345)  # radiance from everywhere
+PAPER = (0.80, 0.795, 0.78)
+BEYOND = (0.46, 0.46, 0.455)  # paper outside the domain
+OBSTACLE = (0.050, 0.058, 0.070)
+RISE = 0.030  # of obstacles, in heights of the picture
+BEVEL = 0.012
+SHEET = 0.006  # thickness of the domain's paper, which lies on the paper beyond
+FINE = 2  # relief vertices per pixel, along each axis; at most MOST
+MOST = 1100
+BOUNCES = 4
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What particles lie on.
+
+    low, high  (2,) corners of the picture, world units
+    inside     (Y, X) float32, world units: distance to the border of the domain, positive inside, as
+               `synth.elements.constraints.Domain` has it; None: paper everywhere
+    cell       edge of its cells, world units; origin (2,): centre of its first cell
+    Holes in the domain are obstacles, what encloses it is beyond.
+    """
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    inside: np.ndarray | None = None
+    cell: float = 1.0
+    origin: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How `picture` looks at particles: its width in pixels, paths per pixel, seed."""
+
+    width: int = 960
+    spp: int = 64
+    seed: int = 1
+
+
+def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, ground: Ground,
+            settings: Settings = Settings()) -> np.ndarray:
+    """Particles on their ground from above: linear light (height, width, 3), its height by the ground's.
+
+    vertices (N, 3) float32, world units, the plane at z = 0; faces (M, 3) int; colours (N, 3) uint8, sRGB.
+    """
+    mi = backend.mitsuba("llvm_ad_rgb")
+    low, high = np.array(ground.low, float), np.array(ground.high, float)
+    height = max(1, round(settings.width * (high[1] - low[1]) / (high[0] - low[0])))
+    # the picture becomes one unit high: lamp, bevels and shadows look the same at any scale
+    scale = 1 / (high[1] - low[1])
+    middle = np.array([*(low + high) / 2, 0.0])
+    transform = mi.ScalarTransform4f
+    toward = np.array(SLANT) / np.linalg.norm(SLANT)
+    aspect = settings.width / height
+    glossy = {"type": "principled", "base_color": {"type": "mesh_attribute", "name": "vertex_color"},
+              "roughness": 0.42, "specular": 0.45, "clearcoat": 0.35, "clearcoat_gloss": 0.82}
+    scene: dict[str, Any] = {
+        "type": "scene",
+        "ground": _ground(mi, ground, height, scale, middle),
+        "lamp": {
+            "type": "rectangle",
+            "to_world": transform().look_at(origin=list(AWAY * toward), target=[0, 0, 0], up=[0, 1, 0]).scale(
+                [0.5 * AWAY * LAMP, 0.5 * AWAY * LAMP, 1]),
+            "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [c / LAMP**2 for c in LAMP_LIGHT]}},
+        },
+        "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}},
+        "sensor": {
+            **surface.film(settings.width, height), "type": "orthographic", "near_clip": 0.1, "far_clip": 10.0,
+            "to_world": transform().look_at(origin=[0, 0, 5], target=[0, 0, 0], up=[0, 1, 0]).scale(
+                [0.5 * aspect, 0.5 * aspect, 1]),
+        },
+    }
+    if len(faces):
+        scene["particles"] = surface.shape(mi, "particles", (vertices - middle) * scale, faces,
+                                           film.decoded(colours / 255.0), glossy)
+    light = mi.render(mi.load_dict(scene), integrator=mi.load_dict({
+        "type": "path", "max_depth": BOUNCES, "rr_depth": BOUNCES}), spp=settings.spp, seed=settings.seed)
+    return np.array(light, np.float32)
+
+
+def _ground(mi: Any, ground: Ground, height: int, scale: float, middle: np.ndarray) -> Any:
+    """The paper of the domain, obstacles on it and the paper beyond, as one relief a little larger than the picture."""
+    low, high = (np.array(corner, float) for corner in (ground.low, ground.high))
+    margin = 0.06 * (high[1] - low[1])
+    low, high = low - margin, high + margin
+    rows = min(FINE * height, MOST) if ground.inside is not None else 2
+    columns = max(2, round(rows * (high[0] - low[0]) / (high[1] - low[1])))
+    x, y = np.meshgrid(np.linspace(low[0], high[0], columns), np.linspace(low[1], high[1], rows))
+    away, hole = _distances(ground, x, y)
+    z, colour = relief(away * scale, hole)
+    points = np.stack([(x - middle[0]) * scale, (y - middle[1]) * scale, z], -1).reshape(-1, 3)
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    faces = np.stack([corner, corner + 1, corner + columns + 1, corner, corner + columns + 1, corner + columns], 1)
+    return surface.shape(mi, "ground", points, faces.reshape(-1, 3), colour.reshape(-1, 3), {
+        "type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}})
+
+
+def _distances(ground: Ground, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """At points: the distance to the domain's border, positive inside; and whether the nearest outside is a hole."""
+    if ground.inside is None:
+        return np.full(x.shape, np.inf), np.zeros(x.shape, bool)
+    at = np.array([(y - ground.origin[1]) / ground.cell, (x - ground.origin[0]) / ground.cell])
+    away = ndimage.map_coordinates(ground.inside.astype(float), at, order=3, mode="nearest")
+    # what touches the grid's edge encloses the domain, the rest is holes in it
+    padded = np.pad(ground.inside < 0, 1, mode="edge")
+    parts, _ = ndimage.label(padded, np.ones((3, 3)))
+    edge = np.unique(np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]]))
+    holes = ((parts > 0) & ~np.isin(parts, edge))[1:-1, 1:-1]
+    near_hole = ndimage.distance_transform_edt(~holes) if holes.any() else np.full(holes.shape, 1e9)
+    rim = (parts > 0)[1:-1, 1:-1] & ~holes
+    near_rim = ndimage.distance_transform_edt(~rim) if rim.any() else np.full(holes.shape, 1e9)
+    nearer = (near_hole < near_rim).astype(float)
+    return away, ndimage.map_coordinates(nearer, at, order=0, mode="nearest") > 0.5
+
+
+def relief(away: np.ndarray, hole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Height (Y, X) and linear colour (Y, X, 3) of the ground, at distances `away` (Y, X) from the domain's border.
+
+    In heights of the picture; obstacles have a round edge, and the domain's paper lies on the paper beyond.
+    """
+    depth = np.maximum(-away, 0)
+    round_edge = np.sqrt(1 - (1 - np.clip(depth / BEVEL, 0, 1)) ** 2)
+    z = np.where(hole, RISE * round_edge, -SHEET * np.clip(depth / 0.004, 0, 1))
+    inside = (away > 0)[..., None]
+    return z, np.where(inside, PAPER, np.where(hole[..., None], OBSTACLE, BEYOND))

@@ -1,0 +1,121 @@
+"""Noodles on a plate, by window light: round, glossy, a little translucent.
+
+`picture` path-traces tubes with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row first;
+`inset` does the same with an exemplar, alone on the table. `render.film` tones both ("filmic").
+
+There is no scattering under a surface. Instead a part of the light goes through a tube's wall, diffusely, into the
+tube and out again on the other side, and takes the colour of dough each time: thin places and edges against the
+light glow, and the heart of a heap is warm instead of black.
+
+World units: the plate's well is at y = 0, a plate of noodles about one unit wide, centred on x = z = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from render import backend, film, studio, surface
+
+CAMERA = studio.Camera(position=(0.0, 2.15, 4.7), target=(0.0, 0.125, 0.0), fov=13.2)
+WINDOW = studio.Softbox((-3.1, 2.8, -1.7), (0.0, 0.1, 0.0), (2.4, 2.0), (19.5, 17.9, 15.8), 1.0)  # left, behind
+FILL = studio.Softbox((3.6, 2.2, 2.4), (0.0, 0.1, 0.0), (3.0, 2.6), (2.5, 2.45, 2.4), 0.6)  # a white wall opposite
+AIR = (0.15, 0.15, 0.155)
+TABLE = (0.068, 0.078, 0.088)
+TABLE_LEVEL = -0.052  # y, below the plate's well
+GLAZE = (0.70, 0.685, 0.66)
+PLATE = 0.86  # radius
+BOUNCES = 6
+
+# dough
+THROUGH = 0.30  # share of the wall that lets light in
+GLOSS = {"roughness": 0.36, "specular": 0.5, "clearcoat": 0.75, "clearcoat_gloss": 0.93}  # oil
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How `picture` looks at noodles: size in pixels, paths per pixel, seed; the plate's radius, world units, 0 for
+    none."""
+
+    width: int = 960
+    height: int = 540
+    spp: int = 64
+    seed: int = 1
+    plate: float = PLATE
+    camera: studio.Camera = CAMERA
+
+
+def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settings: Settings = Settings(),
+            ) -> np.ndarray:
+    """Noodles on a plate on a table: linear light (height, width, 3).
+
+    vertices (N, 3) float32, world units; faces (M, 3) int, closed tubes; colours (N, 3) uint8, sRGB.
+    """
+    return _traced(vertices, faces, colours, settings, TABLE_LEVEL, settings.plate)
+
+
+def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,
+          settings: Settings = Settings()) -> np.ndarray:
+    """An exemplar's noodles alone on the table, as `picture` shows them; the box from `low` to `high` (3,), which
+    holds them in all frames, fills the picture."""
+    box = np.stack([low, high])
+    aspect = settings.width / settings.height
+    level = float(studio.placed(box, low, high, settings.camera, aspect)[0, 1])
+    return _traced(studio.placed(vertices, low, high, settings.camera, aspect), faces, colours, settings, level, 0.0)
+
+
+def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settings: Settings, level: float,
+            radius: float) -> np.ndarray:
+    """Noodles over a table at y = level, and on a plate if its radius is not 0."""
+    mi = backend.mitsuba("llvm_ad_rgb")
+    scene = {
+        "type": "scene",
+        "sensor": surface.sensor(mi, settings.camera, settings.width, settings.height),
+        "window": surface.lamp(mi, WINDOW), "fill": surface.lamp(mi, FILL),
+        "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}, "sampling_weight": 0.25},
+        "noodles": surface.shape(mi, "noodles", vertices, faces, film.decoded(colours / 255.0), dough()),
+        "table": surface.plain(mi, "table", table(level), {"type": "twosided", "bsdf": {
+            "type": "principled", "base_color": {"type": "rgb", "value": list(TABLE)}, "roughness": 0.55,
+            "specular": 0.35}}),
+    }
+    if radius:
+        scene["plate"] = surface.plain(mi, "plate", plate(radius), {
+            "type": "principled", "base_color": {"type": "rgb", "value": list(GLAZE)}, "roughness": 0.42,
+            "specular": 0.5, "clearcoat": 0.5, "clearcoat_gloss": 0.9})
+    light = mi.render(mi.load_dict(scene), integrator=mi.load_dict({
+        "type": "path", "max_depth": BOUNCES, "rr_depth": BOUNCES}), spp=settings.spp, seed=settings.seed)
+    return np.array(light, np.float32)
+
+
+def dough() -> dict[str, Any]:
+    """What noodles are made of; its colour is the vertices'."""
+    colour = {"type": "mesh_attribute", "name": "vertex_color"}
+    return {
+        "type": "blendbsdf", "weight": THROUGH,
+        "outside": {"type": "twosided", "bsdf": {"type": "principled", "base_color": colour, **GLOSS}},
+        "through": {"type": "principledthin", "base_color": colour, "roughness": 0.4, "diff_trans": 1.7, "eta": 1.3},
+    }
+
+
+def table(level: float) -> studio.Mesh:
+    """A table at y = level that rises behind into the wall without an edge."""
+    return studio.Mesh(studio.backdrop().vertices + np.array([0.0, level, 0.0], np.float32),
+                       studio.backdrop().faces)
+
+
+def plate(radius: float) -> studio.Mesh:
+    """A shallow plate: foot, underside, lip, slope and a flat well at y = 0."""
+    r, low = radius, TABLE_LEVEL
+    wall = 0.020
+    lip = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(-0.4, 0.7, 14) * np.pi]) * 0.5 * wall
+    share = np.linspace(0, 1, 24)
+    ease = share * share * (3 - 2 * share)
+    well, rise = 0.60 * r, 0.105 * r
+    # outside first, bottom to top, then down into the well
+    outside = np.stack([0.52 * r + (0.985 - 0.52) * r * share, low + 0.012 + (rise - 0.02 - low) * share**1.6], 1)
+    inside = np.stack([0.975 * r + (well - 0.975 * r) * share, rise * (1 - ease) ** 1.25], 1)
+    foot = np.array([[0.0, low + 0.002], [0.46 * r, low + 0.002], [0.50 * r, low], [0.515 * r, low + 0.004]])
+    return studio.revolved(np.concatenate([foot, outside, np.array([[0.985 * r, rise - 0.004]]) + lip, inside,
+                                           [[0.3 * r, 0.0], [0.0, 0.0]]]), segments=256)

@@ -1,0 +1,57 @@
+"""Beads on paper: they lie where they should, the picture repeats, obstacles stand up and what is beyond does not."""
+
+import numpy as np
+import pytest
+
+from render import beads
+from synth.elements import mesh
+
+SMALL = beads.Settings(width=64, spp=9)
+CELL = 0.02
+AXIS = (np.arange(100) + 0.5) * CELL - 1.0
+X, Y = np.meshgrid(AXIS, AXIS)
+DISC_WITH_HOLE = np.minimum(0.9 - np.hypot(X, Y), np.hypot(X, Y) - 0.3).astype(np.float32)
+"""Distance to the border of a disc with a round hole."""
+
+
+def ground(inside: np.ndarray | None = None) -> beads.Ground:
+    return beads.Ground((-1.0, -0.75), (1.0, 0.75), inside, CELL, (AXIS[0], AXIS[0]))
+
+
+def red_bead(x: float, y: float) -> mesh.Mesh:
+    return mesh.solids(np.array([[x, y]]), np.array([0.1]), np.array([[0.9, 0.1, 0.1]]))
+
+
+def test_a_picture_repeats_and_a_bead_lies_where_it_should() -> None:
+    m = red_bead(0.5, 0.375)
+    first = beads.picture(m.vertices, m.faces, m.colours, ground(), SMALL)
+    assert first.shape == (48, 64, 3) and np.isfinite(first).all()
+    assert np.array_equal(first, beads.picture(m.vertices, m.faces, m.colours, ground(), SMALL))
+    red = first[..., 0] > 1.5 * first[..., 1]
+    row, column = (np.flatnonzero(red.any(axis)).mean() + 0.5 for axis in (1, 0))
+    assert (column / 64 * 2 - 1, 0.75 - row / 48 * 1.5) == pytest.approx((0.5, 0.375), abs=0.02)
+    assert red.sum() * (2 / 64) ** 2 == pytest.approx(np.pi * 0.01, rel=0.25)
+
+
+def test_a_bead_throws_a_shadow_away_from_the_lamp() -> None:
+    m = red_bead(0.0, 0.0)
+    seen = beads.picture(m.vertices, m.faces, m.colours, ground(), beads.Settings(64, 36))[..., 1]
+    assert seen[27, 35] < 0.9 * seen[20, 28]  # below to the right, above to the left
+    assert seen[:6].mean() == pytest.approx(seen[-6:].mean(), rel=0.05)  # lit evenly
+
+
+def test_holes_are_obstacles_and_what_encloses_is_beyond() -> None:
+    away, hole = beads._distances(ground(DISC_WITH_HOLE), X, Y)
+    assert away == pytest.approx(DISC_WITH_HOLE, abs=1e-5)
+    radius = np.hypot(X, Y)
+    assert hole[radius < 0.28].all() and not hole[radius > 0.92].any()
+    z, colour = beads.relief(away, hole)
+    assert (z[radius < 0.28] > 0.9 * beads.RISE).all() and (z[radius > 0.92] < 0).all()
+    assert (z[(radius > 0.32) & (radius < 0.88)] == 0).all()
+    assert (colour[radius < 0.28] == beads.OBSTACLE).all() and (colour[radius > 0.92] == beads.BEYOND).all()
+
+
+def test_a_picture_shows_the_obstacle_dark_on_white() -> None:
+    seen = beads.picture(np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros((0, 3)), ground(DISC_WITH_HOLE), SMALL)
+    assert seen[22:26, 30:34].mean() < 0.3 * seen[22:26, 48:52].mean()
+    assert seen[0, 0].mean() < 0.8 * seen[22:26, 48:52].mean()
