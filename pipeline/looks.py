@@ -99,14 +99,15 @@ def make_beauty(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterat
 
 
 def _picture(scene: ElementsScene, mesh: dict[str, np.ndarray], frame: int, ground: Any, width: int, spp: int,
-             inset: bool = False) -> np.ndarray:
+             box: np.ndarray | None = None) -> np.ndarray:
+    """One picture; with a box (2, 3) that of an exemplar, which fills a square."""
     from render import beads, noodles, papers, shoal
 
     render: Any = scene.render
     if render.kind == "beads":
         return beads.picture(**mesh, ground=ground, settings=beads.Settings(width=width, spp=spp, seed=scene.seed))
     height = round(render.height * width / render.width)
-    if inset:
+    if box is not None:
         height = width
     how: dict[str, Any] = {"width": width, "height": height, "spp": spp, "seed": scene.seed}
     if render.kind == "shoal":
@@ -114,7 +115,9 @@ def _picture(scene: ElementsScene, mesh: dict[str, np.ndarray], frame: int, grou
         how["time"] = frame / scene.fps
     else:
         look = noodles if render.kind == "noodles" else papers
-    made: np.ndarray = (look.inset if inset else look.picture)(**mesh, settings=look.Settings(**how))
+    settings = look.Settings(**how)
+    made: np.ndarray = (look.picture(**mesh, settings=settings) if box is None
+                        else look.inset(**mesh, low=box[0], high=box[1], settings=settings))
     return made
 
 
@@ -122,9 +125,8 @@ def _ground(scene: ElementsScene, stock: Stock) -> Any:
     """What beads lie on."""
     if scene.render.kind != "beads":
         return None
-    from render.beads import Ground
-
     from pipeline.elements import domain
+    from render.beads import Ground
 
     found = domain(scene, stock)
     inside = np.argwhere(found.inside > 0)[:, ::-1]
@@ -141,9 +143,10 @@ def make_exemplar_picture(scene: ElementsScene, stock: Stock, frames: list[int])
 
     example = stock.read("exemplar")
     ground = None
+    # of all frames: the inset does not follow its elements
+    extent = np.stack([example.positions.min(axis=(0, 1, 2)), example.positions.max(axis=(0, 1, 2))])
     if scene.render.kind == "beads":
-        corners = example.box if example.box is not None else np.stack(
-            [example.positions.min(axis=(0, 1, 2)), example.positions.max(axis=(0, 1, 2))])
+        corners = example.box if example.box is not None else extent
         ground = Ground(tuple(corners[0]), tuple(corners[1]))
     seen: dict[int, np.ndarray] = {}
     for frame in frames:
@@ -152,7 +155,7 @@ def make_exemplar_picture(scene: ElementsScene, stock: Stock, frames: list[int])
             found = mesh_of(scene, example, at)
             mesh = {"vertices": found.vertices, "faces": found.faces, "colours": found.colours}
             seen = {at: _picture(scene, mesh, frame, ground, scene.figure.panel // 2,
-                                 max(1, round(INSET * scene.render.spp)), inset=True)}
+                                 max(1, round(INSET * scene.render.spp)), box=extent)}
         yield frame, seen[at]
 
 
