@@ -13,5 +13,6 @@
 
 The modules: samples (what elements are), mesh (their surfaces).
 
-The exemplars I and coarse motions C: arrangement (points at rest), school (fish).
+The exemplars I and coarse motions C: arrangement (points at rest), school (fish), simulation (noodles, paper),
+bundle (threads side by side).
 """
