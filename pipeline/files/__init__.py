@@ -7,5 +7,8 @@ images      OpenEXR: linear pictures and 2-D fields
 pictures    8-bit PNG, and what OpenImageIO does with pictures
 meshes      PLY of meshes and points; a stranger's mesh as voxels
 mending     closes a mesh that is not watertight (pymeshlab)
+polygons    a stranger's PLY and OBJ as they stand, and the elements that their vertices make
+tracks      element tracks: our own .npz; tables, sequences of meshes and curves of a user's
+stage       OpenUSD: one file of a whole animation of elements
 video       H.264
 """

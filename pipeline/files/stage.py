@@ -235,8 +235,12 @@ class _Stage:
         before = self.constant[name]
         if np.array_equal(before, values):
             return
-        if not attribute.GetNumTimeSamples():
-            self.at(1, attribute, before)  # before its first time sample an attribute has that one's value
+        # before its first sample an attribute has that one's value; between two, numbers are interpolated, indices held
+        last = (attribute.GetTimeSamples() or [0])[-1]
+        if not last:
+            self.at(1, attribute, before)
+        if values.dtype.kind == "f" and last < frame - 1:
+            self.at(frame - 1, attribute, before)
         self.constant[name] = values
         self.at(frame, attribute, values)
 

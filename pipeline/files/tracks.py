@@ -41,7 +41,7 @@ from synth.elements.samples import Elements
 TABLES = ("csv", "tsv", "txt")
 LARGEST = 1e9  # of a coordinate
 SECONDS_PER_FILE = 0.1
-_VERSION = "flowloom_tracks"  # which form of the file this is
+_FIELDS = "flowloom_tracks"  # the names of the arrays: a damaged directory of a zip loses entries without a word
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the same elements give the same bytes
 
@@ -55,7 +55,7 @@ def write(path: Path, elements: Elements) -> None:
     arrays = {name: np.asarray(value) for name, value in fields.items() if value is not None}
     with atomic.replacing(path) as temporary:
         with zipfile.ZipFile(temporary, "w") as archive:
-            for name, array in {_VERSION: np.array(1), **arrays}.items():
+            for name, array in {_FIELDS: np.array(list(arrays)), **arrays}.items():
                 with archive.open(zipfile.ZipInfo(f"{name}.npy", _LONG_AGO), "w", force_zip64=True) as entry:
                     np.lib.format.write_array(entry, np.asarray(array, order="C"), allow_pickle=False)
         try:
@@ -84,13 +84,16 @@ def _arrays(path: Path) -> dict[str, Any]:
     """The arrays of a .npz, or ValueError."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            found = dict(stored)
+            found: dict[str, Any] = dict(stored)
     except MemoryError:
         raise
     except Exception as error:  # zipfile and numpy raise anything at a file cut short
         raise ValueError(f"damaged, cut short or no .npz file ({error or type(error).__name__})") from error
-    if _VERSION not in found or "positions" not in found:
+    if _FIELDS not in found or "positions" not in found:
         raise ValueError("holds no element tracks of flowloom")
+    lost = set(np.ravel(found[_FIELDS]).tolist()) - found.keys()
+    if lost:
+        raise ValueError(f"damaged: {', '.join(map(str, lost))} is lost")
     return found
 
 
@@ -99,7 +102,7 @@ def _elements(arrays: dict[str, Any]) -> Elements:
     known = {field.name: arrays[field.name] for field in dataclasses.fields(Elements) if field.name in arrays}
     try:
         known["grid"] = tuple(int(n) for n in np.ravel(known.get("grid", ())))
-        known["rate"] = float(known.get("rate", 24.0))
+        known["rate"] = float(np.ravel(known.get("rate", 24.0)).reshape(1)[0])
         return Elements(**known)
     except (TypeError, OverflowError) as error:
         raise ValueError(f"damaged: {error}") from error
