@@ -59,6 +59,15 @@ def test_what_is_written_is_read_and_its_bytes_are_always_the_same(tmp_path: Pat
     assert same(tracks.read_foreign(tmp_path / "a.npz", "key"), elements)
 
 
+def test_what_lies_beside_the_elements(tmp_path: Path) -> None:
+    tracks.write(tmp_path / "a.npz", some(), energy=np.arange(3.0))
+    assert same(tracks.read(tmp_path / "a.npz"), some())
+    with np.load(tmp_path / "a.npz") as stored:
+        assert stored["energy"].tolist() == [0, 1, 2]
+    with pytest.raises(ValueError, match="cannot lie beside them: coarse"):
+        tracks.write(tmp_path / "a.npz", some(), coarse=np.zeros(3))
+
+
 def test_a_damaged_file_of_our_own_is_one_line(tmp_path: Path) -> None:
     tracks.write(tmp_path / "whole.npz", some((5,)))
     whole, path, random = (tmp_path / "whole.npz").read_bytes(), tmp_path / "a.npz", generator(2)

@@ -46,24 +46,27 @@ _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(nan|
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the same elements give the same bytes
 
 
-def write(path: Path, elements: Elements) -> None:
+def write(path: Path, elements: Elements, **beside: np.ndarray) -> None:
     """Write elements as one .npz, an array of each of their fields that is not None, and read it back.
 
+    beside  arrays by other names, of numbers, that lie beside them: `read` passes over them
     numpy.load reads it without pickle. Raises `StorageFailed` if it does not read back.
     """
     fields = {field.name: getattr(elements, field.name) for field in dataclasses.fields(elements)}
-    arrays = {name: np.asarray(value) for name, value in fields.items() if value is not None}
+    if fields.keys() & beside.keys():
+        raise ValueError(f"a field of Elements cannot lie beside them: {', '.join(fields.keys() & beside.keys())}")
+    arrays = {name: np.asarray(value) for name, value in (fields | beside).items() if value is not None}
     with atomic.replacing(path) as temporary:
         with zipfile.ZipFile(temporary, "w") as archive:
             for name, array in {_FIELDS: np.array(list(arrays)), **arrays}.items():
                 with archive.open(zipfile.ZipInfo(f"{name}.npy", _LONG_AGO), "w", force_zip64=True) as entry:
                     np.lib.format.write_array(entry, np.asarray(array, order="C"), allow_pickle=False)
         try:
-            back = read(temporary)
-        except BadInput as error:
-            raise StorageFailed(path, f"did not read back ({error.reason}); is the disk full?") from error
+            back = _arrays(temporary)
+        except ValueError as error:
+            raise StorageFailed(path, f"did not read back ({error}); is the disk full?") from error
         for name, array in arrays.items():
-            if not np.array_equal(getattr(back, name), array):
+            if not np.array_equal(back[name], array):
                 raise StorageFailed(path, f"'{name}' did not read back as it was written; is the disk full?")
 
 
