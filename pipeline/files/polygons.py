@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -43,9 +43,11 @@ def read(path: Path) -> Shape:
     if not len(shape.vertices):
         raise ValueError("holds no vertices")
     for name, parts in (("line", shape.lines), ("face", shape.faces)):
+        named = np.fromiter(chain.from_iterable(parts), np.int64)
+        if len(named) and (named.min() < 0 or named.max() >= len(shape.vertices)):
+            number = next(n for n, part in enumerate(parts, 1) if min(part) < 0 or max(part) >= len(shape.vertices))
+            raise ValueError(f"{name} {number} names a vertex that does not exist")
         for number, part in enumerate(parts, 1):
-            if min(part) < 0 or max(part) >= len(shape.vertices):
-                raise ValueError(f"{name} {number} names a vertex that does not exist")
             if len(set(part)) < len(part) - (name == "line" and part[0] == part[-1]):
                 raise ValueError(f"{name} {number} names a vertex twice")
     return shape
@@ -83,7 +85,8 @@ def _ply(content: bytes) -> Shape:
     face, edge = found.get("face", {}), found.get("edge", {})
     faces = face.get("vertex_indices", face.get("vertex_index", ()))
     ends = zip(edge.get("vertex1", ()), edge.get("vertex2", ()), strict=True)
-    return Shape(vertices, [(int(a), int(b)) for a, b in ends], [tuple(map(int, f)) for f in faces if len(f)])
+    whole = faces.astype(np.int64).tolist() if isinstance(faces, np.ndarray) else (map(int, face) for face in faces)
+    return Shape(vertices, [(int(a), int(b)) for a, b in ends], [face for face in map(tuple, whole) if face])
 
 
 def _header(content: bytes) -> tuple[str, list[tuple[str, int, Properties]], int]:

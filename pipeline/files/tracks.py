@@ -40,7 +40,7 @@ from synth.elements.samples import Elements
 
 TABLES = ("csv", "tsv", "txt")
 LARGEST = 1e9  # of a coordinate
-SECONDS_PER_FILE = 0.1
+SECONDS, SECONDS_PER_FILE = 60.0, 0.5  # that a sequence may take: far more than it does
 _FIELDS = "flowloom_tracks"  # the names of the arrays: a damaged directory of a zip loses entries without a word
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the same elements give the same bytes
@@ -166,12 +166,12 @@ def read_foreign(path: Path, key: str, *, rate: float | None = None, dimensions:
     size = sum(file.stat().st_size for file in files)
     if kind in polygons.FORMATS:
         names = [str(file.resolve()) for file in files]
-        seconds = shelter.SECONDS + SECONDS_PER_FILE * len(files) + size / 2e6
+        seconds = SECONDS + SECONDS_PER_FILE * len(files) + size / 1e6
         found = shelter.read(_sequence, files[0], key, names, seconds=seconds)
     elif len(files) > 1:
         raise BadInput(path, key, "a sequence is of PLY or OBJ files")
     elif kind in TABLES:
-        found = shelter.read(_table, path, key, dimensions, seconds=shelter.SECONDS + size / 1e6)
+        found = shelter.read(_table, path, key, dimensions, seconds=SECONDS + size / 2e5)
     elif kind in stage.FORMATS:
         found = shelter.read(_stage, path, key, prim)
     elif kind == "npz":
