@@ -134,7 +134,7 @@ def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
         start = initialize.carried(start, flow)
     margin = 0.5 * wanted.spacing if scene.obstacles or wanted.domain else 0.0
     return within, start, Guides(
-        Constraints(region, margin, _pins(scene, start.elements.positions)), flow, turn, allowed=allowed,
+        Constraints(region, margin, _pins(scene, start.elements.positions), hard=margin > 0), flow, turn, allowed=allowed,
         period=_toroidal(scene))
 
 

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import cg
 from threadpoolctl import threadpool_limits
 
 from synth.elements.samples import Elements
-from synth.elements.search import Exemplar, Matches, Output, _at_offsets, tied_falloff
+from synth.elements.search import Exemplar, Matches, Output, _at_offsets, tied_weight
 
 TOLERANCE = 1e-4  # relative residual of the conjugate gradients
 MOST_ITERATIONS = 200
@@ -122,7 +122,7 @@ def _of_tied(within: Exemplar, output: Output, coarse: np.ndarray | None, sample
     way is turned as a whole.
     """
     at = _at_offsets(Elements(output.positions, within.elements.grid), within.offsets)[samples]
-    kappa = tied_falloff(within)
+    kappa = tied_weight(within)
     terms = []
     base = np.zeros((1, within.detail.shape[1])) if coarse is None else coarse
     for f in _near(within.offsets):

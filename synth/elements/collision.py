@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from synth.elements.neighborhood import wrapped
 from synth.elements.search import difference
 
 ROUNDS = 8  # of pushing apart, at most
@@ -17,15 +18,8 @@ def overlaps(points: np.ndarray, radius: np.ndarray, element: np.ndarray, period
 
     points (M, D), radius (M,) and element (M,) of each sample; period (D,) of a toroidal domain, 0 where it ends.
     """
-    box = None
-    inside = points.astype(np.float64)
-    if period is not None:
-        wrapped = period > 0
-        inside = np.where(wrapped, np.mod(inside, np.where(wrapped, period, 1.0)), inside)
-        # SciPy: an axis of size 0 does not repeat
-        box = np.where(wrapped, period, 0.0)
-        inside[:, wrapped] = np.where(inside[:, wrapped] >= period[wrapped], 0.0, inside[:, wrapped])
-    pairs = cKDTree(inside, boxsize=box).query_pairs(2 * float(radius.max()), output_type="ndarray")
+    inside = wrapped(points, period)
+    pairs = cKDTree(inside, boxsize=period).query_pairs(2 * float(radius.max()), output_type="ndarray")
     pairs = pairs[element[pairs[:, 0]] != element[pairs[:, 1]]]
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     away = difference(points[pairs[:, 1]] - points[pairs[:, 0]], period)

@@ -5,13 +5,14 @@ Each kind adds anchors to the assignment step (soft) and may correct positions a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
 
 from synth.elements.assignment import Anchors
 
+CORNERS = 4  # times that a sample is put on the nearest border: in a corner it then lies beyond another
 PULL = 4.0  # weight of a sample that is out of its domain, in terms of Eq. 7
 
 
@@ -65,25 +66,29 @@ class Constraints:
     domain   where samples stay; obstacles are holes in it
     margin   distance from its border that samples keep, world units
     pins     hard positions
+    hard     what lies outside after an assignment is put on the border; else it is only pulled
     """
 
     domain: Domain | None = None
     margin: float = 0.0
     pins: Pins | None = None
-    pull: float = field(default=PULL)
+    hard: bool = True
 
     def anchors(self, positions: np.ndarray, first: int) -> Anchors:
         """Soft terms for the samples (M, D) whose first has the index `first`."""
         if self.domain is None:
             return Anchors.none(positions.shape[1])
         out, target = self.domain.outside(positions, self.margin)
-        return Anchors(out + first, target, np.full(len(out), self.pull))
+        return Anchors(out + first, target, np.full(len(out), PULL))
 
     def enforced(self, positions: np.ndarray) -> np.ndarray:
-        """Positions (M, D), with what lies outside put on the border."""
-        if self.domain is None:
+        """Positions (M, D), with what lies outside put on the border where it is hard."""
+        if self.domain is None or not self.hard:
             return positions
         result = positions.copy()
-        out, target = self.domain.outside(positions, self.margin)
-        result[out] = target
+        for _ in range(CORNERS):
+            out, target = self.domain.outside(result, self.margin)
+            if not len(out):
+                break
+            result[out] = target
         return result

@@ -157,8 +157,7 @@ def _over_time(exemplar: Elements, placed: np.ndarray, source: np.ndarray, frame
     steps = np.zeros((frames, len(placed), exemplar.dimensions))
     if frames > 1 and exemplar.frames > 1:
         own = exemplar.positions[:, :, 0].astype(np.float64)
-        following = np.minimum(frame[:-1] + 1, exemplar.frames - 1)
-        steps[1:] = own[following, element[:-1]] - own[frame[:-1], element[:-1]]
+        steps[1:] = own[frame[1:], element[1:]] - own[np.maximum(frame[1:] - 1, 0), element[1:]]
         if turn is not None:
             steps = np.einsum("nij,tnj->tni", turn(placed), steps)
     positions = (placed + np.cumsum(steps, axis=0))[:, :, None]
@@ -204,8 +203,10 @@ def tracks(exemplar: Elements, source: np.ndarray, frames: int, begin: np.ndarra
         ended = frame[t - 1] + 1 >= exemplar.frames
         element[t], frame[t] = element[t - 1], np.where(ended, 0, frame[t - 1] + 1)
         if ended.any():
+            # the last step is like the one from `alike` to the next frame: go on after that
             alike = np.asarray(tree.query(features[-1, element[t - 1, ended]])[1])
-            element[t, ended], frame[t, ended] = alike % exemplar.count, alike // exemplar.count
+            element[t, ended] = alike % exemplar.count
+            frame[t, ended] = np.minimum(alike // exemplar.count + 2, exemplar.frames - 1)
     return element, frame
 
 

@@ -31,6 +31,7 @@ class Shape:
     whole    other samples in all those frames; else, compact, only s itself there
     along    samples on each side along a thread, or in each direction on a sheet: 3 is 7 and 7×7
     most     other samples that count, the nearest first
+    motion   weight of the motion, the samples tied in time, against the arrangement; see `search.tied_weight`
     sigma    σ_p of Eq. 10, world units (it divides the square of a distance, as printed: length²); inf: no falloff
     sigma_t  σ_t of Eq. 10, frames²
     """
@@ -40,7 +41,8 @@ class Shape:
     after: int = 0
     whole: bool = False
     along: int = 3
-    most: int = 16
+    most: int = 24
+    motion: float = 0.1
     sigma: float = np.inf
     sigma_t: float = np.inf
 
@@ -87,8 +89,8 @@ def spacing(positions: np.ndarray, period: np.ndarray | None = None) -> float:
     found = []
     for frame in np.unique(np.linspace(0, frames - 1, 8).astype(int)):
         points = positions[frame].reshape(-1, dims)
-        tree, wrapped = _tree(points, period)
-        distance, index = tree.query(wrapped, k=min(samples + 1, len(points)))
+        tree = _tree(points, period)
+        distance, index = tree.query(wrapped(points, period), k=min(samples + 1, len(points)))
         others = np.asarray(index) // samples != (np.arange(len(points)) // samples)[:, None]
         nearest = np.where(others, distance, np.inf).min(axis=1)
         found.append(nearest[np.isfinite(nearest)])
@@ -116,19 +118,24 @@ def others(positions: np.ndarray, shape: Shape, active: np.ndarray, period: np.n
                 continue
             if other not in trees:
                 trees[other] = _tree(positions[other].reshape(-1, dims), period)
-            centre = positions[frame].reshape(-1, dims) % period if period is not None else \
-                positions[frame].reshape(-1, dims)
-            found[n, :, b] = _within(trees[other][0], centre, shape.radius * stretch, shape.most, samples, size)
+            centre = wrapped(positions[frame].reshape(-1, dims), period)
+            found[n, :, b] = _within(trees[other], centre, shape.radius * stretch, shape.most, samples, size)
             found[n, :, b][found[n, :, b] >= 0] += other * size
     return found.reshape(-1, len(shape.times) * shape.most)
 
 
-def _tree(points: np.ndarray, period: np.ndarray | None) -> tuple[cKDTree, np.ndarray]:
-    if period is None:
-        return cKDTree(points), points
-    wrapped = np.mod(points.astype(np.float64), period)
-    wrapped[wrapped >= period] = 0.0
-    return cKDTree(wrapped, boxsize=period), wrapped
+def wrapped(points: np.ndarray, period: np.ndarray | None) -> np.ndarray:
+    """Points (M, D) float64 in the one unit of a domain that repeats with `period` (D,), 0 along axes that end."""
+    inside = points.astype(np.float64)
+    for axis in np.flatnonzero(period) if period is not None else ():
+        inside[:, axis] = np.mod(inside[:, axis], period[axis])  # type: ignore[index]
+        inside[inside[:, axis] >= period[axis], axis] = 0.0  # type: ignore[index]
+    return inside
+
+
+def _tree(points: np.ndarray, period: np.ndarray | None) -> cKDTree:
+    # SciPy: an axis with a box of size 0 does not repeat
+    return cKDTree(wrapped(points, period), boxsize=period)
 
 
 def _within(tree: cKDTree, centre: np.ndarray, radius: float, most: int, samples: int, size: int) -> np.ndarray:

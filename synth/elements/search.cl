@@ -113,7 +113,7 @@ typedef struct {
 // The distance (Eq. 9) to the exemplar's neighbourhood `in`; INFINITY as soon as it is known to be `limit` or more.
 float distance_to(const Neighborhood *o, int in, float limit, int *partner, __global const float *in_other,
                   __global const float *in_falloff, __global const float *in_alone, __global const int *in_others,
-                  __global const float *in_tied, __global const char *in_tie, __constant const float *tied_falloff,
+                  __global const float *in_tied, __global const char *in_tie, __constant const float *tied_weight,
                   __global const float *in_detail, __global const float *in_control, __global const int *in_label,
                   float centre_weight, float control_weight, float missing) {
     if (!(o->allowed & in_label[in]))
@@ -128,7 +128,7 @@ float distance_to(const Neighborhood *o, int in, float limit, int *partner, __gl
         if (o->tie[f] < 0)
             continue;
         if (o->tie[f] != in_tie[in * F + f]) {
-            sum += tied_falloff[f] * missing;
+            sum += tied_weight[f] * missing;
             continue;
         }
         float squared = 0.0f;
@@ -136,7 +136,7 @@ float distance_to(const Neighborhood *o, int in, float limit, int *partner, __gl
             const float apart = o->tied[f * D + d] - in_tied[(in * F + f) * D + d];
             squared += apart * apart;
         }
-        sum += tied_falloff[f] * squared;
+        sum += tied_weight[f] * squared;
     }
     for (int b = 0; b < B; b++) {
         const int n = o->others[b], m = in_others[in * B + b], base = in * B * K + b * K;
@@ -184,7 +184,7 @@ __kernel void nearest(__global const int *samples,        // (M) output samples 
                       __global const int *neighbors,      // (M, B * K)
                       __constant const int *offsets,      // (F, 3)
                       __constant const int *times,        // (B)
-                      __constant const float *tied_falloff,  // (F)
+                      __constant const float *tied_weight,  // (F)
                       __global const float *control,      // (M)
                       __global const int *allowed,        // (M)
                       float radius, float sigma, __constant const float *time_falloff,  // (B)
@@ -257,7 +257,7 @@ __kernel void nearest(__global const int *samples,        // (M) output samples 
         if (in < 0)
             continue;
         const float found = distance_to(&o, in, least[N - 1], partner, in_other, in_falloff, in_alone, in_others, in_tied,
-                                        in_tie, tied_falloff, in_detail, in_control, in_label, centre_weight,
+                                        in_tie, tied_weight, in_detail, in_control, in_label, centre_weight,
                                         control_weight, missing);
         if (!(found < least[N - 1]))
             continue;
@@ -274,7 +274,7 @@ __kernel void nearest(__global const int *samples,        // (M) output samples 
             partner[k] = -1;
         if (best[n] >= 0)
             distance_to(&o, best[n], INFINITY, partner, in_other, in_falloff, in_alone, in_others, in_tied, in_tie,
-                        tied_falloff, in_detail, in_control, in_label, centre_weight, control_weight, missing);
+                        tied_weight, in_detail, in_control, in_label, centre_weight, control_weight, missing);
         match[i * N + n] = best[n];
         apart[i * N + n] = least[n];
         for (int k = 0; k < B * K; k++)

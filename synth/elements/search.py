@@ -28,7 +28,7 @@ CANDIDATES = 24  # of k-coherence, at most
 SIMILAR = 3  # of the exemplar's samples most like each
 DESCRIPTOR = 12  # numbers in which the exemplar's own neighbourhoods are first compared
 FIRST_FOUND = 16  # of these, by the descriptor, the most similar are taken by the distance itself
-EXHAUSTIVE = 600  # exemplar samples up to which each is looked at
+AT_REST = 100.0  # weight of the motion of an exemplar that has none
 
 
 @dataclass(frozen=True)
@@ -226,7 +226,7 @@ class Searcher:
             opencl.to_device(np.zeros(dims, np.float32) if output.period is None else
                              output.period.astype(np.float32)),
             opencl.to_device(matches.neighbors[samples]), offsets,
-            opencl.to_device(np.array(shape.times, np.int32)), opencl.to_device(tied_falloff(self.within)),
+            opencl.to_device(np.array(shape.times, np.int32)), opencl.to_device(tied_weight(self.within)),
             opencl.to_device(output.control[samples].astype(np.float32)),
             opencl.to_device(output.allowed[samples].astype(np.int32)),
             np.float32(shape.radius), np.float32(shape.sigma),
@@ -251,11 +251,27 @@ def neighborhood_spacing(within: Exemplar) -> float:
     return float(np.median(tied)) if tied.size and tied.any() else within.shape.radius / 2
 
 
-def tied_falloff(within: Exemplar) -> np.ndarray:
-    """κ of the tied samples, (F,) float32 (at least one): by time only, since an offset along an element is not a
-    distance in space."""
-    falloff = within.shape.falloff(0.0, within.offsets[:, 0])
-    return np.append(falloff, 0.0).astype(np.float32)
+def tied_weight(within: Exemplar) -> np.ndarray:
+    """Weights of the tied samples, (F,) float32 (at least one): κ by time, since an offset along an element is not a
+    distance in space; and in time what makes a motion count.
+
+    The way of a sample in a few frames is small beside the distances to its neighbours, and would say nothing beside
+    them. So its square is measured by the exemplar's own mean square of such ways, and that of a neighbourhood's radius
+    by shape.motion: at 1 a motion as unlike as two of the exemplar's counts as a neighbour that is a radius away.
+    Elements of an exemplar at rest should only go with the flow: AT_REST.
+    """
+    shape, offsets = within.shape, within.offsets
+    weight = np.ones(len(offsets) + 1)
+    weight[:-1] = shape.falloff(0.0, offsets[:, 0])
+    trail = offsets[:, 0] != 0
+    there = within.tie[:, trail] > 0
+    ways = np.sum(within.tied[:, trail].astype(np.float64) ** 2, axis=-1)[there]
+    typical = float(ways.mean()) if ways.size else 0.0
+    if typical > 0:
+        weight[:-1][trail] *= max(1.0, shape.motion * shape.radius**2 / typical)
+    elif within.elements.frames == 1:
+        weight[:-1][trail] *= AT_REST
+    return weight.astype(np.float32)
 
 
 def similar(within: Exemplar) -> np.ndarray:
@@ -310,7 +326,7 @@ def nearest_reference(within: Exemplar, output: Output, samples: np.ndarray, nei
     count = output.positions.shape[1] * output.positions.shape[2]
     position = output.positions.reshape(-1, output.positions.shape[3])
     at = _at_offsets(Elements(output.positions, within.elements.grid), within.offsets)
-    kappa = tied_falloff(within)
+    kappa = tied_weight(within)
     blocks = len(shape.times)
     result = (np.full((len(samples), n), -1), np.full((len(samples), n), np.inf),
               np.full((len(samples), n, blocks * shape.most), -1))

@@ -33,7 +33,8 @@ class Settings:
     coherent    k-coherence, else exhaustive search
     solver      "sparse": all positions at once; "local": each by its neighbours as constants, `sweeps` times
     centre      weight of anchored details' own place, in search and assignment
-    inertia     weight of the way the flow carries a sample from the frame before, frame by frame
+    inertia     weight of where a sample is carried from the frame before, frame by frame, in terms of what its
+                neighbours say
     control     weight of the control map's difference in the search
     hybrid      resolve collisions after each assignment
     """
@@ -44,7 +45,7 @@ class Settings:
     solver: str = "sparse"
     sweeps: int = 6
     centre: float = 0.3
-    inertia: float = 1.0
+    inertia: float = 3.0
     control: float = 0.0
     hybrid: bool = False
 
@@ -87,6 +88,7 @@ class Optimizer:
         self.radius = np.repeat(start.size, start.positions.shape[2]).astype(np.float64)
         self.element = np.repeat(np.arange(start.count), start.positions.shape[2])
         self.energies: list[float] = []
+        self.carried: np.ndarray | None = None  # where a frame's samples begin, frame by frame
 
     def iterate(self, active: np.ndarray, known: int) -> float:
         """One search and one assignment of the samples in the frames `active`; returns the energy (Eq. 5) per sample
@@ -168,10 +170,17 @@ class Optimizer:
     def _anchors(self, output: Output, coarse: np.ndarray | None, active: np.ndarray) -> Iterator[Anchors]:
         """The soft terms of Θ."""
         dims = self.positions.shape[3]
+        if self.carried is not None:
+            samples = self._samples(active)
+            yield Anchors(samples, self.carried, np.full(len(samples), self.settings.inertia * self._said()))
         for t in active:
             yield self.guides.constraints.anchors(self.positions[t].reshape(-1, dims), int(t) * self.size)
         if self.within.anchored and coarse is not None and self.settings.centre > 0:
             yield assignment.centred(self.within, output, coarse, self.matches, active, self.settings.centre)
+
+    def _said(self) -> float:
+        """The weight of what neighbours say of a sample, on average: what other terms are measured by."""
+        return max(1.0, 2.0 * float(self.within.falloff.sum(axis=1).mean()))
 
     def correct(self, active: np.ndarray) -> None:
         """The extra solver step, and the hard constraints."""
@@ -241,6 +250,7 @@ def by_frames(within: Exemplar, first: Elements, source: np.ndarray, frames: int
     for frame in range(len(optimizer.energies) // settings.iterations, frames):
         if frame:
             _advected(optimizer, frame)
+            optimizer.carried = optimizer.positions[frame].reshape(-1, first.dimensions).copy()
         optimizer.correct(np.array([frame]))
         for _ in range(settings.iterations):
             optimizer.iterate(np.array([frame]), frame + 1)

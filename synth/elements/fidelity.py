@@ -1,0 +1,96 @@
+"""How like its exemplar an output is: pair correlation, motion spectrum, distance to the nearest; and jitter (ma13 §4.2).
+
+All take positions (T, E, S, D), world units, and look at whole elements by the middle of their samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+BINS = 24  # of the pair correlation, up to REACH
+REACH = 3.0  # nearest distances
+FRAMES = 12  # of an animation that are looked at, at most
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What is compared.
+
+    correlation  (BINS,) g at radii up to REACH nearest distances: 1 where elements know nothing of each other
+    spectrum     power of the velocity by frequency, (T // 2,); empty of what does not move
+    nearest      mean distance to the nearest element
+    """
+
+    correlation: np.ndarray
+    spectrum: np.ndarray
+    nearest: float
+
+
+def statistics(positions: np.ndarray, spacing: float, period: np.ndarray | None = None,
+               depth: Callable[[np.ndarray], np.ndarray] | None = None, carried: np.ndarray | None = None,
+               ) -> Statistics:
+    """Of an exemplar or an output.
+
+    spacing  the exemplar's nearest distance, by which radii are measured
+    period   (D,) where it repeats along all axes
+    depth    of points (M, D) in their domain; those nearer to its border than REACH are not asked for their
+             neighbours, so that the border does not count as emptiness. None: all are
+    carried  like positions: how far a global flow has carried each, which is not its own motion
+    """
+    points = positions.mean(axis=2).astype(np.float64)
+    reach = REACH * spacing
+    counts, asked, nearest, density = np.zeros(BINS), 0, [], []
+    for t in np.unique(np.linspace(0, len(points) - 1, FRAMES).astype(int)):
+        now = points[t] if period is None else np.mod(points[t], period)
+        tree = cKDTree(now, boxsize=period)
+        inner = np.arange(len(now)) if depth is None else np.flatnonzero(depth(now) > reach)
+        if not len(inner):
+            continue
+        distance = tree.query(now[inner], k=2)[0][:, 1]
+        nearest.append(distance)
+        pairs = tree.sparse_distance_matrix(cKDTree(now[inner], boxsize=period), reach, output_type="coo_matrix")
+        apart = pairs.data[pairs.data > 0]
+        counts += np.histogram(apart, bins=BINS, range=(0, reach))[0]
+        density.append(len(apart) / len(inner))
+        asked += len(inner)
+    if not asked:
+        raise ValueError("no element lies deep enough in the domain to be looked at")
+    edges = np.linspace(0, reach, BINS + 1)
+    shell = np.diff(edges ** points.shape[2])
+    # normed by how many there are within REACH: the density is asked for apart
+    correlation = counts / asked / shell * reach ** points.shape[2] / max(float(np.mean(density)), 1e-9)
+    return Statistics(correlation, spectrum(positions if carried is None else positions - carried),
+                      float(np.mean(np.concatenate(nearest))))
+
+
+def spectrum(positions: np.ndarray) -> np.ndarray:
+    """Power of the elements' own velocity by frequency, (T // 2,), without the mean motion."""
+    if len(positions) < 4:
+        return np.zeros(0)
+    velocity = np.diff(positions.mean(axis=2).astype(np.float64), axis=0)
+    velocity -= velocity.mean(axis=(0, 1))
+    window = np.hanning(len(velocity) + 2)[1:-1, None, None]
+    return np.mean(np.sum(np.abs(np.fft.rfft(velocity * window, axis=0)) ** 2, axis=2), axis=1)
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> float:
+    """How far two functions are apart: the mean absolute difference over the mean of the first; 0 for empty ones.
+
+    Of two lengths the shorter counts, both being spectra of the same frequencies from 0 on after resampling.
+    """
+    if not len(one) or not len(other):
+        return 0.0
+    if len(one) != len(other):
+        other = np.interp(np.linspace(0, 1, len(one)), np.linspace(0, 1, len(other)), other) * len(one) / len(other)
+    return float(np.abs(one - other).mean() / max(float(np.abs(one).mean()), 1e-30))
+
+
+def jitter(positions: np.ndarray) -> float:
+    """Mean squared acceleration of the samples, world units² per frame⁴ (§4.2)."""
+    if len(positions) < 3:
+        return 0.0
+    return float(np.mean(np.sum(np.diff(positions.astype(np.float64), n=2, axis=0) ** 2, axis=-1)))

@@ -1,0 +1,46 @@
+"""Fidelity: what the statistics say of arrangements that are known."""
+
+import numpy as np
+import pytest
+
+from synth.elements import arrangement, fidelity
+
+
+def test_a_grid_has_its_peaks_and_chance_has_none() -> None:
+    grid = arrangement.hexagonal_grid((12, 12))
+    period = grid.box[1] - grid.box[0]
+    found = fidelity.statistics(grid.positions, 1.0, period)
+    at = (np.arange(fidelity.BINS) + 0.5) / fidelity.BINS * fidelity.REACH
+    assert found.nearest == pytest.approx(1.0, abs=1e-3)
+    assert found.correlation[at < 0.9].max() == 0 and found.correlation.max() > 3
+    rng = np.random.Generator(np.random.Philox(key=1))
+    chance = fidelity.statistics(rng.uniform(0, 30, (1, 3000, 1, 2)), 1.0, np.array([30.0, 30.0]))
+    assert np.abs(chance.correlation[3:] - 1).max() < 0.15
+
+
+def test_the_border_does_not_count_as_emptiness() -> None:
+    rng = np.random.Generator(np.random.Philox(key=2))
+    points = rng.uniform(0, 30, (1, 3000, 1, 2))
+
+    def depth(p: np.ndarray) -> np.ndarray:
+        return np.minimum(p, 30 - p).min(axis=1)
+
+    whole = fidelity.statistics(points, 1.0, np.array([30.0, 30.0]))
+    inner = fidelity.statistics(points, 1.0, depth=depth)
+    assert fidelity.apart(whole.correlation, inner.correlation) < 0.06
+    with pytest.raises(ValueError, match="deep enough"):
+        fidelity.statistics(points, 20.0, depth=depth)
+
+
+def test_a_spectrum_shows_its_frequency() -> None:
+    t = np.arange(65)
+    positions = np.zeros((65, 3, 1, 2))
+    positions[:, :, 0, 0] = np.sin(2 * np.pi * t / 8)[:, None] + np.arange(3) * 5
+    assert np.argmax(fidelity.spectrum(positions)) == 8
+
+
+def test_apart_and_jitter() -> None:
+    assert fidelity.apart(np.ones(4), np.ones(4)) == 0 and fidelity.apart(np.ones(4), 2 * np.ones(4)) == 1
+    even = np.arange(5.0)[:, None, None, None] * np.ones((1, 2, 1, 2))
+    assert fidelity.jitter(even) == 0
+    assert fidelity.jitter(even**2) == pytest.approx(8.0)
