@@ -100,7 +100,36 @@ def test_turning_and_moving_a_sheet_is_undone() -> None:
     assert simulation._fitted(flat @ turn + [3, -2, 5], flat) == pytest.approx(flat)
 
 
+@pytest.fixture(scope="module")
+def lifted() -> np.ndarray:
+    return simulation.lifted(40, length=80.0, thick=6.0)
+
+
+def test_a_lifted_noodle_keeps_its_length_and_lies_on_the_plate(lifted: np.ndarray) -> None:
+    assert lifted.shape == (40, 40, 3) and lifted.dtype == np.float32
+    segment = np.linalg.norm(np.diff(lifted, axis=1), axis=-1)
+    assert np.abs(segment / (80 / 39) - 1).max() < 0.02
+    assert lifted[..., 1].min() > 0.9 * 6, "the middle of a bundle of radius 6"
+    assert np.ptp(lifted[0, :, 1]) < 0.5 and np.linalg.norm(lifted[0][:, [0, 2]], axis=1).max() < 40
+
+
+def test_a_lifted_noodle_rises_at_its_first_sample_smoothly(lifted: np.ndarray) -> None:
+    assert lifted[-1, 0, 1] == pytest.approx(0.8 * 80, abs=1)
+    assert (np.diff(lifted[:, 0, 1]) > -0.1).all()
+    acceleration = np.linalg.norm(np.diff(lifted.astype(float), 2, axis=0), axis=-1)
+    assert acceleration.max() < 1.5  # world units per frame²: 64 in 26 frames, and it swings
+    bend = np.degrees(np.arccos(np.clip(_turns(lifted), -1, 1)))
+    assert bend.max() < 25, "from sample to sample: no kinks"
+
+
+def _turns(curve: np.ndarray) -> np.ndarray:
+    step = np.diff(curve.astype(float), axis=1)
+    step /= np.linalg.norm(step, axis=-1, keepdims=True)
+    return (step[:, 1:] * step[:, :-1]).sum(-1)
+
+
 @pytest.mark.parametrize("made", [
+    lambda seed: Elements(simulation.lifted(3, seed=seed)[:, None], (40,)),
     lambda seed: simulation.noodles(3, 3, seed=seed),
     lambda seed: simulation.sheets(1, 3, seed=seed),
 ])
@@ -125,6 +154,9 @@ def test_what_comes_apart_is_said_and_leaves_no_file(monkeypatch: pytest.MonkeyP
     (lambda: simulation.noodles(radius=0.6), "do not lie 1 apart"),
     (lambda: simulation.noodles(length=3), "do not lie 1 apart"),
     (lambda: simulation.noodles(shake=9), "shake = 9"),
+    (lambda: simulation.lifted(height=3), "height = 3"),
+    (lambda: simulation.lifted(length=50, thick=8), "10 times as long, not 50"),
+    (lambda: simulation.lifted(1), "2 frames or more"),
     (lambda: simulation.sheets(0), "1 to 100 sheets"),
     (lambda: simulation.sheets(side=2), "3 × 3 to 15 × 15"),
     (lambda: simulation.sheets(wind=np.nan), "wind up to 3"),

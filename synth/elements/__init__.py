@@ -14,5 +14,5 @@
 The modules: samples (what elements are), mesh (their surfaces).
 
 The exemplars I and coarse motions C: arrangement (points at rest), school (fish), simulation (noodles, paper),
-bundle (threads side by side).
+handmade (the same by hand), bundle (threads side by side), scraps (paper in a gust).
 """

@@ -34,6 +34,8 @@ PAPER = {"density": 0.08, "carried": 0.14, "young": 2e9, "thickness": 1e-4, "dam
 AIR, PLATE, ALONG = 1.2, 2.0, 0.3  # density; drag of a plate that faces the wind, and of one along it
 BORNE = 0.7  # of a sheet's weight by an updraught: it stays with its gusts
 GUST = 1.2  # m/s, rms
+BUNDLE = {"density": 300.0, "bends": 2.2, "damping": 0.06}  # kg/m³; how far, in its radii, its stiffness carries its
+# weight; seconds in which a bend dies away
 SETTLE = 1.5  # seconds before the first frame
 SHAKE = np.array([0.055, 0.055, 0.09])  # rms of the acceleration of the hand that holds noodles, of gravity
 
@@ -181,9 +183,10 @@ def _curls(rng: np.random.Generator, count: int, angle: float) -> np.ndarray:
 
 def _nodes(model: Any, data: Any, count: int) -> np.ndarray:
     """Both ends of all links of the chains now, (E, LINKS + 1, 3), metres."""
-    begin = data.xpos[1:].reshape(count, LINKS, 3)
-    along = data.xmat[1:].reshape(count, LINKS, 3, 3)[:, -1:, :, 2]
-    return np.concatenate([begin, begin[:, -1:] + along * 2 * model.geom_size[0, 1]], 1)
+    first = model.nbody - count * LINKS
+    begin = data.xpos[first:].reshape(count, LINKS, 3)
+    middle = data.geom_xpos[-count * LINKS:].reshape(count, LINKS, 3)[:, -1:]
+    return np.concatenate([begin, 2 * middle - begin[:, -1:]], 1)
 
 
 def sheets(count: int = 8, frames: int = 60, *, side: int = 7, spacing: float = 1.0, thickness: float = 0.02,
@@ -316,3 +319,82 @@ def _fitted(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
     left, _, right = np.linalg.svd(offset.T @ flat)
     mirror = np.array([1, 1, np.sign(np.linalg.det(left @ right))])
     return offset @ (left * mirror) @ right
+
+
+def lifted(frames: int = 60, *, samples: int = 40, length: float = 100.0, thick: float = 8.0, height: float = 0.8,
+           lasts: float = 0.65, rate: float = 24.0, seed: int = 0) -> np.ndarray:
+    """The coarse motion of noodles (ma13 §6.2, figure 10a): one curve (frames, samples, 3) float32, world units.
+
+    A bundle lies on a plate at y = 0, y up, bent to an arc about x = z = 0. It is taken at sample 0, lifted, and swings
+    as it hangs, its other end on the plate for as long as it is not too high.
+    thick   radius of the bundle, world units: so high above the plate its middle lies, and so it resists bending
+    height  to which sample 0 is lifted, in lengths, 0 to 1.5; lasts: the share of the clip that the lift lasts
+    `bundle.duplicated` gives all noodles its motion. Raises ValueError for numbers out of these ranges, or a bundle
+    that is less than ten times as long as its radius.
+    """
+    _check(frames, rate, samples)
+    if not (thick > 0 and length >= 10 * thick):
+        raise ValueError(f"a bundle of radius {thick:g} is to be 10 times as long, not {length:g}")
+    if not (0 <= height <= 1.5 and 0.1 <= lasts <= 1):
+        raise ValueError(f"height = {height} is not between 0 and 1.5, or lasts = {lasts} not between 0.1 and 1")
+    rng = np.random.Generator(np.random.Philox(key=seed))
+    bend = rng.choice([-1.0, 1.0]) * rng.uniform(3.0, 3.6)  # radians from one end to the other
+    with _watched("a noodle") as mujoco:
+        nodes = _hoisted(mujoco, frames, rate, length * METRES, thick * METRES, bend, height, lasts,
+                         _waves(rng, (2,), 0.25, 0.8)) / METRES
+    curve = CubicSpline(np.arange(LINKS + 1), nodes, axis=1)(np.linspace(0, LINKS, samples))
+    return np.stack([curve[..., 0], curve[..., 2], -curve[..., 1]], -1).astype(np.float32)
+
+
+def _hoisted(mujoco: Any, frames: int, rate: float, length: float, thick: float, bend: float, height: float,
+             lasts: float, unsteady: Callable[[float], np.ndarray]) -> np.ndarray:
+    """Ends of the links (frames, LINKS + 1, 3), metres, z up, of a chain whose first end a hand takes up."""
+    steps, step = _steps(rate)
+    model = _lying(mujoco, length, thick, bend, step)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    before = int(np.ceil(SETTLE / step))
+    taken = data.mocap_pos[0].copy()
+    over = np.array([*0.35 * taken[:2], max(thick, height * length)])  # nearer to the middle of the plate
+    end = lasts * (frames - 1) / rate
+    nodes = np.empty((frames, LINKS + 1, 3))
+    for k in range(before + (frames - 1) * steps + 1):
+        mujoco.mj_kinematics(model, data)
+        if k >= before and (k - before) % steps == 0:
+            nodes[(k - before) // steps] = _nodes(model, data, 1)[0]
+        s = np.clip((k - before) * step / end, 0, 1)
+        s = s**3 * (10 + s * (6 * s - 15))
+        data.mocap_pos[0] = taken + s * (over - taken)
+        data.mocap_pos[0, :2] += 0.03 * length * s * unsteady((k - before) * step)
+        mujoco.mj_step(model, data)
+    return nodes
+
+
+def _lying(mujoco: Any, length: float, thick: float, bend: float, step: float) -> Any:
+    """MuJoCo's model of one thick chain that lies in an arc on a plate, and of the hand that holds its first end."""
+    link, angle = length / LINKS, bend / LINKS
+    radius = length / bend
+    geom = f'<geom fromto="0 0 0 {link} 0 0" size="{thick}"/>'
+    following = f'<body pos="{link} 0 0" euler="0 0 {angle}"><joint type="ball"/>{geom}'
+    heavy = np.pi * thick**2 * BUNDLE["density"]
+    stiffness = heavy * GRAVITY * (BUNDLE["bends"] * thick) ** 3 / link
+    return mujoco.MjModel.from_xml_string(f"""
+        <mujoco>
+          <compiler angle="radian"/>
+          <option timestep="{step}" integrator="implicitfast" solver="CG" iterations="60" tolerance="1e-8"
+                  gravity="0 0 {-GRAVITY}"/>
+          <default>
+            <geom type="capsule" contype="1" conaffinity="2" friction="0.25" density="{BUNDLE['density']}"
+                  solref="{4 * step} 1"/>
+            <joint stiffness="{stiffness}" damping="{BUNDLE['damping'] * stiffness}"
+                   armature="{0.05 * heavy * link * link**2}"/>
+          </default>
+          <worldbody>
+            <geom type="plane" size="0 0 1" contype="2" conaffinity="1"/>
+            <body name="hand" mocap="true" pos="0 {-radius} {thick}"/>
+            <body name="first" pos="0 {-radius} {thick}" euler="0 0 {angle / 2}"><freejoint/>{geom}
+              {following * (LINKS - 1)}{"</body>" * (LINKS - 1)}
+            </body>
+          </worldbody>
+          <equality><connect body1="first" body2="hand" anchor="0 0 0" solref="{4 * step} 1"/></equality>
+        </mujoco>""")
