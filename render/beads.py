@@ -29,7 +29,7 @@ BEVEL = 0.012
 SHEET = 0.006  # thickness of the domain's paper, which lies on the paper beyond
 FINE = 2  # relief vertices per pixel, along each axis; at most MOST
 MOST = 1100
-BOUNCES = 4
+BOUNCES = 2
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,8 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, ground
     if len(faces):
         scene["particles"] = surface.shape(mi, "particles", (vertices - middle) * scale, faces,
                                            film.decoded(colours / 255.0), glossy)
-    light = mi.render(mi.load_dict(scene), integrator=mi.load_dict({
-        "type": "path", "max_depth": BOUNCES, "rr_depth": BOUNCES}), spp=settings.spp, seed=settings.seed)
+    light = mi.render(mi.load_dict(scene), integrator=surface.every_lamp(mi, BOUNCES), spp=settings.spp,
+                      seed=settings.seed)
     return np.array(light, np.float32)
 
 

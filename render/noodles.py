@@ -22,12 +22,12 @@ from render import backend, film, studio, surface
 CAMERA = studio.Camera(position=(0.0, 2.15, 4.7), target=(0.0, 0.125, 0.0), fov=13.2)
 WINDOW = studio.Softbox((-3.1, 2.8, -1.7), (0.0, 0.1, 0.0), (2.4, 2.0), (19.5, 17.9, 15.8), 1.0)  # left, behind
 FILL = studio.Softbox((3.6, 2.2, 2.4), (0.0, 0.1, 0.0), (3.0, 2.6), (2.5, 2.45, 2.4), 0.6)  # a white wall opposite
-AIR = (0.15, 0.15, 0.155)
+AIR = (0.17, 0.17, 0.175)
 TABLE = (0.068, 0.078, 0.088)
 TABLE_LEVEL = -0.052  # y, below the plate's well
 GLAZE = (0.70, 0.685, 0.66)
 PLATE = 0.86  # radius
-BOUNCES = 6
+BOUNCES = 2
 
 # dough
 THROUGH = 0.30  # share of the wall that lets light in
@@ -74,7 +74,7 @@ def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settin
         "type": "scene",
         "sensor": surface.sensor(mi, settings.camera, settings.width, settings.height),
         "window": surface.lamp(mi, WINDOW), "fill": surface.lamp(mi, FILL),
-        "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}, "sampling_weight": 0.25},
+        "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}},
         "noodles": surface.shape(mi, "noodles", vertices, faces, film.decoded(colours / 255.0), dough()),
         "table": surface.plain(mi, "table", table(level), {"type": "twosided", "bsdf": {
             "type": "principled", "base_color": {"type": "rgb", "value": list(TABLE)}, "roughness": 0.55,
@@ -84,8 +84,8 @@ def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settin
         scene["plate"] = surface.plain(mi, "plate", plate(radius), {
             "type": "principled", "base_color": {"type": "rgb", "value": list(GLAZE)}, "roughness": 0.42,
             "specular": 0.5, "clearcoat": 0.5, "clearcoat_gloss": 0.9})
-    light = mi.render(mi.load_dict(scene), integrator=mi.load_dict({
-        "type": "path", "max_depth": BOUNCES, "rr_depth": BOUNCES}), spp=settings.spp, seed=settings.seed)
+    light = mi.render(mi.load_dict(scene), integrator=surface.every_lamp(mi, BOUNCES), spp=settings.spp,
+                      seed=settings.seed)
     return np.array(light, np.float32)
 
 

@@ -18,10 +18,10 @@ from render import backend, film, studio, surface
 CAMERA = studio.Camera(position=(0.0, 0.74, 5.4), target=(0.0, 0.46, 0.0), fov=12.2)
 SUN = studio.Softbox((-3.4, 3.0, -0.9), (0.0, 0.4, 0.0), (1.2, 1.2), (76.0, 68.0, 57.0), 1.0)  # high, left, behind
 FILL = studio.Softbox((3.4, 1.6, 3.4), (0.0, 0.4, 0.0), (3.2, 2.8), (1.3, 1.45, 1.7), 0.5)
-AIR = (0.115, 0.125, 0.145)
+AIR = (0.135, 0.145, 0.165)
 BACKDROP = (0.40, 0.405, 0.41)
 CLEAR = 0.2  # between an inset's sheets and its floor
-BOUNCES = 6
+BOUNCES = 2
 PALETTE = ((0.965, 0.955, 0.930), (0.925, 0.905, 0.850), (0.905, 0.430, 0.330), (0.970, 0.780, 0.380),
            (0.330, 0.560, 0.620))
 """Colours that go together, sRGB: white, cream, vermilion, amber, petrol."""
@@ -67,13 +67,13 @@ def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settin
         "type": "scene",
         "sensor": surface.sensor(mi, settings.camera, settings.width, settings.height),
         "sun": surface.lamp(mi, SUN), "fill": surface.lamp(mi, FILL),
-        "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}, "sampling_weight": 0.3},
+        "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}},
         "paper": surface.shape(mi, "paper", vertices, faces, film.decoded(colours / 255.0), paper()),
         "backdrop": surface.plain(mi, "backdrop", ground, {"type": "twosided", "bsdf": {
             "type": "diffuse", "reflectance": {"type": "rgb", "value": list(BACKDROP)}}}),
     })
-    light = mi.render(scene, integrator=mi.load_dict({
-        "type": "path", "max_depth": BOUNCES, "rr_depth": BOUNCES}), spp=settings.spp, seed=settings.seed)
+    light = mi.render(scene, integrator=surface.every_lamp(mi, BOUNCES), spp=settings.spp,
+                      seed=settings.seed)
     return np.array(light, np.float32)
 
 

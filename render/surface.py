@@ -1,4 +1,4 @@
-"""Meshes, cameras and lamps as Mitsuba takes them, for the pictures of surfaces."""
+"""Meshes, cameras and lamps as Mitsuba takes them, for the pictures of surfaces; the light that they exchange."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from render import studio
+from render import backend, studio
 
 SAMPLER = "multijitter"  # a quarter of the variance of independent paths, and less on what is lit evenly
 
@@ -70,3 +70,63 @@ def lamp(mi: Any, box: studio.Softbox) -> dict[str, Any]:
         "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(box.radiance)},
                     "sampling_weight": box.share},
     }
+
+
+def every_lamp(mi: Any, bounces: int, split: int = 1) -> Any:
+    """An integrator for rooms with few lamps: every lamp is asked at every place that a path meets.
+
+    bounces  how often light is sent on from surface to surface before the eye's; split: paths that go on from where
+             a ray of the eye ends
+    A path tracer draws lots between the lamps: more noise for the same rays. Light from everywhere (a constant
+    emitter) is met, not asked.
+    """
+    dr = backend.drjit()
+    context = mi.BSDFContext()
+
+    class EveryLamp(mi.SamplingIntegrator):
+        def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
+            first = scene.ray_intersect(ray, active)
+            light = first.emitter(scene, active).eval(first, active)
+            hit = active & first.is_valid()
+            bsdf = first.bsdf(ray)
+            light += self.asked(scene, sampler, first, bsdf, hit)
+            for _ in range(split):
+                light += self.sent_on(scene, sampler, first, bsdf, hit) / split
+            return light, mi.Bool(True), []
+
+        def asked(self, scene: Any, sampler: Any, met: Any, bsdf: Any, active: Any) -> Any:
+            """The lamps' light that a surface sends back along the ray, but for the share that `sent_on` finds."""
+            light = mi.Color3f(0)
+            for emitter in scene.emitters():
+                if emitter.is_environment():
+                    continue
+                way, seen = emitter.sample_direction(met, sampler.next_2d(active), active)
+                lit = active & (way.pdf > 0)
+                back, chance = bsdf.eval_pdf(context, met, met.to_local(way.d), lit)
+                lit &= ~scene.ray_test(met.spawn_ray_to(way.p), lit)
+                light += dr.select(lit, back * seen * self.own(way.pdf, chance), 0)
+            return light
+
+        def own(self, chance: Any, other: Any) -> Any:
+            """The share of two ways to find a lamp that the first has, by their densities [Veach and Guibas 1995]."""
+            share = chance / (chance + other)
+            return dr.select(dr.isfinite(share), share, 0)
+
+        def sent_on(self, scene: Any, sampler: Any, met: Any, bsdf: Any, active: Any) -> Any:
+            """The light that comes to a surface from others, and what its own lobes find of the lamps."""
+            light, share = mi.Color3f(0), mi.Color3f(1)
+            for _ in range(bounces):
+                chosen, weight = bsdf.sample(context, met, sampler.next_1d(active), sampler.next_2d(active), active)
+                share = share * dr.select(active, weight, 0)
+                found = scene.ray_intersect(met.spawn_ray(met.to_world(chosen.wo)), active)
+                hit = active & found.is_valid()
+                emitter = found.emitter(scene, active)
+                asked = emitter.pdf_direction(met, mi.DirectionSample3f(scene, found, met), hit)
+                own = dr.select(hit, self.own(chosen.pdf, asked), 1)
+                light += dr.select(active, share * emitter.eval(found, active) * own, 0)
+                met, active = found, hit
+                bsdf = met.bsdf()
+                light += share * self.asked(scene, sampler, met, bsdf, active)
+            return light
+
+    return EveryLamp(mi.Properties())
