@@ -20,8 +20,8 @@ import numpy as np
 from render import backend, film, studio, surface
 
 CAMERA = studio.Camera(position=(0.0, 2.15, 4.7), target=(0.0, 0.125, 0.0), fov=13.2)
-WINDOW = studio.Softbox((-3.1, 2.8, -1.7), (0.0, 0.1, 0.0), (2.4, 2.0), (19.5, 17.9, 15.8), 1.0)  # left, behind
-FILL = studio.Softbox((3.6, 2.2, 2.4), (0.0, 0.1, 0.0), (3.0, 2.6), (2.5, 2.45, 2.4), 0.6)  # a white wall opposite
+WINDOW = studio.Softbox((-3.1, 2.8, -1.7), (0.0, 0.1, 0.0), (2.4, 2.0), (22.0, 19.8, 17.0), 1.0)  # left, behind
+FILL = studio.Softbox((3.6, 2.2, 2.4), (0.0, 0.1, 0.0), (3.0, 2.6), (3.6, 3.45, 3.3), 0.6)  # a white wall opposite
 AIR = (0.17, 0.17, 0.175)
 TABLE = (0.068, 0.078, 0.088)
 TABLE_LEVEL = -0.052  # y, below the plate's well
@@ -31,7 +31,7 @@ BOUNCES = 2
 
 # dough
 THROUGH = 0.30  # share of the wall that lets light in
-GLOSS = {"roughness": 0.36, "specular": 0.5, "clearcoat": 0.75, "clearcoat_gloss": 0.93}  # oil
+GLOSS = {"roughness": 0.30, "specular": 0.5, "clearcoat": 1.0, "clearcoat_gloss": 0.93}  # oil
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,12 @@ import numpy as np
 from render import backend, film, studio, surface
 
 CAMERA = studio.Camera(position=(0.0, 0.74, 5.4), target=(0.0, 0.46, 0.0), fov=12.2)
-SUN = studio.Softbox((-3.4, 3.0, -0.9), (0.0, 0.4, 0.0), (1.2, 1.2), (76.0, 68.0, 57.0), 1.0)  # high, left, behind
+SUN = studio.Softbox((-3.4, 3.0, -0.9), (0.0, 0.4, 0.0), (1.2, 1.2), (94.0, 84.0, 70.0), 1.0)  # high, left, behind
 FILL = studio.Softbox((3.4, 1.6, 3.4), (0.0, 0.4, 0.0), (3.2, 2.8), (1.3, 1.45, 1.7), 0.5)
-AIR = (0.135, 0.145, 0.165)
-BACKDROP = (0.40, 0.405, 0.41)
+AIR = (0.22, 0.23, 0.25)  # radiance from everywhere
+BACKDROP = (0.355, 0.36, 0.365)
 CLEAR = 0.2  # between an inset's sheets and its floor
-BOUNCES = 2
+BOUNCES = 1
 PALETTE = ((0.965, 0.955, 0.930), (0.925, 0.905, 0.850), (0.905, 0.430, 0.330), (0.970, 0.780, 0.380),
            (0.330, 0.560, 0.620))
 """Colours that go together, sRGB: white, cream, vermilion, amber, petrol."""
@@ -80,4 +80,4 @@ def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settin
 def paper() -> dict[str, Any]:
     """A sheet that sends a third of the light that it does not keep through."""
     return {"type": "principledthin", "base_color": {"type": "mesh_attribute", "name": "vertex_color"},
-            "roughness": 0.65, "diff_trans": 0.75, "eta": 1.35, "spec_trans": 0.0}
+            "roughness": 0.65, "diff_trans": 0.92, "eta": 1.35, "spec_trans": 0.0}

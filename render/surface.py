@@ -8,6 +8,7 @@ import numpy as np
 
 from render import backend, studio
 
+BRIGHTEST = 3.0  # light that one surface gets from another along a path, at most
 SAMPLER = "multijitter"  # a quarter of the variance of independent paths, and less on what is lit evenly
 
 
@@ -126,7 +127,8 @@ def every_lamp(mi: Any, bounces: int, split: int = 1) -> Any:
                 light += dr.select(active, share * emitter.eval(found, active) * own, 0)
                 met, active = found, hit
                 bsdf = met.bsdf()
-                light += share * self.asked(scene, sampler, met, bsdf, active)
+                # a glint of a glint is a firefly: few paths find it, and each would be a spot
+                light += dr.minimum(share * self.asked(scene, sampler, met, bsdf, active), BRIGHTEST)
             return light
 
     return EveryLamp(mi.Properties())
