@@ -27,15 +27,13 @@ NEIGHBOURS = 9  # threads that are copied side by side
 
 
 def make_exemplar(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
-    """I, by procedure or from a file; points and fish scaled so that their nearest distance is elements.spacing."""
+    """I, by procedure or from a file, scaled so that its spacing is elements.spacing."""
     example = _exemplar(scene)
-    if example.topology == "none":
-        example = _scaled(example, scene.elements.spacing)
-    yield 0, example
+    yield 0, _scaled(example, scene.elements.spacing / _spacing(example))
 
 
 def _exemplar(scene: ElementsScene) -> Elements:
-    from synth.elements import arrangement, byhand, school, simulation
+    from synth.elements import arrangement, handmade, school, simulation
 
     wanted: Any = scene.exemplar
     match wanted.kind:
@@ -51,21 +49,32 @@ def _exemplar(scene: ElementsScene) -> Elements:
             made = {"homogeneous": school.homogeneous, "crossing": school.crossing, "mixed": school.mixed}
             return made[wanted.behaviour](wanted.count, frames=wanted.frames, rate=scene.fps, seed=scene.seed)[0]
         case "noodles":
-            kind = {"simulated": simulation.noodles, "jagged": byhand.jagged_noodles}[wanted.style]
-            return kind(frames=wanted.frames, rate=scene.fps, seed=scene.seed)
+            threads = {"simulated": simulation.noodles, "jagged": handmade.jagged}[wanted.style]
+            return threads(frames=wanted.frames, rate=scene.fps, seed=scene.seed)
         case "papers":
-            kind = {"simulated": simulation.papers, "folded": byhand.folded_papers}[wanted.style]
-            return kind(frames=wanted.frames, rate=scene.fps, seed=scene.seed)
+            sheets = {"simulated": simulation.sheets, "folded": handmade.folded,
+                      "fluttering": handmade.fluttering}[wanted.style]
+            return sheets(frames=wanted.frames, rate=scene.fps, seed=scene.seed)
     return tracks.read_foreign(wanted.file, "exemplar.file", rate=wanted.rate or scene.fps,
                                dimensions=scene.dimension)
 
 
-def _scaled(example: Elements, spacing: float) -> Elements:
+def _spacing(example: Elements) -> float:
+    """What elements.spacing says of an exemplar: of points and threads the nearest distance, of sheets that of their
+    samples."""
     from synth.elements import neighborhood
 
-    factor = spacing / neighborhood.spacing(example.positions, _period(example))
-    return replace(example, positions=example.positions * factor, size=example.size * factor,
-                   box=None if example.box is None else example.box * factor)
+    if example.topology != "sheet":
+        places = example.positions if example.coarse is None else example.coarse
+        return neighborhood.spacing(places, _period(example))
+    surface = example.positions.reshape(*example.positions.shape[:2], *example.grid, 3)
+    return float(np.linalg.norm(np.diff(surface, axis=3), axis=-1).mean())
+
+
+def _scaled(example: Elements, factor: float) -> Elements:
+    lengths = {name: getattr(example, name) * np.float32(factor) for name in ("positions", "size", "coarse", "box")
+               if getattr(example, name) is not None}
+    return replace(example, **lengths)
 
 
 def _period(example: Elements) -> np.ndarray | None:
@@ -257,7 +266,7 @@ def _pins(scene: ElementsScene, positions: np.ndarray) -> Any:
 
 def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[Any, Any, Any]:
     """The exemplar for the search, the first guess and the guides of threads or sheets on coarse positions."""
-    from synth.elements import initialize, neighborhood, orientation, search
+    from synth.elements import initialize, orientation, search
     from synth.elements.constraints import Constraints
     from synth.elements.synthesis import Guides
 
@@ -274,8 +283,7 @@ def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
         return orientation.on_sheets(positions, example.grid)
 
     inner, outer = frames_of(example.coarse), frames_of(coarse)
-    spacing = neighborhood.spacing(example.positions)
-    within = search.exemplar(example, _shape(scene, spacing), inner)
+    within = search.exemplar(example, _shape(scene, scene.elements.spacing), inner)
     neighbours = NEIGHBOURS if example.topology == "thread" else 1
     start = initialize.on_coarse(example, coarse, inner, outer, neighbours, scene.seed, scene.fps)
     return within, start, Guides(Constraints(), frames=outer)
@@ -283,7 +291,7 @@ def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
 
 def make_coarse(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
     """C of threads or sheets, as many as the output has."""
-    from synth.elements import simulation
+    from synth.elements import bundle, scraps, simulation
 
     wanted: Any = scene.coarse
     example = stock.read("exemplar")
@@ -294,11 +302,17 @@ def make_coarse(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterat
             raise ValueError(f"coarse.file has a grid {foreign.grid} for an element, the exemplar {example.grid}")
         yield 0, foreign
         return
-    kind = {"lifted": simulation.lifted, "poured": simulation.poured, "gust": simulation.gust}[wanted.kind]
-    positions = kind(count, example, frames=scene.frames, rate=scene.fps, seed=scene.seed)
-    looks_of = np.arange(len(positions[0])) % example.count
-    yield 0, Elements(positions, example.grid, scene.fps, example.size[looks_of], example.kind[looks_of],
-                      example.colour[looks_of])
+    spacing, settings = scene.elements.spacing, {"frames": scene.frames, "rate": scene.fps, "seed": scene.seed}
+    if wanted.kind == "gust":
+        yield 0, _scaled(scraps.tossed(count, side=example.grid[0], **settings), spacing)
+        return
+    thick = float(np.linalg.norm(bundle.section(count, 1.0), axis=1).max()) + 0.5
+    length = float(np.linalg.norm(np.diff(example.coarse[0, 0], axis=0), axis=-1).sum()) / spacing
+    curve = simulation.lifted(samples=example.grid[0], length=max(length, 10 * thick), thick=thick, **settings)
+    made = _scaled(bundle.duplicated(curve, count, radius=float(np.median(example.size)) / spacing, rate=scene.fps),
+                   spacing)
+    alike = np.arange(count) % example.count
+    yield 0, replace(made, kind=example.kind[alike], colour=example.colour[alike])
 
 
 STATE = "elements.state.npz"
@@ -348,7 +362,7 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
         name="exemplar", stage="synth", folder="fields", suffix=_npz, animated=False,
         reads=("exemplar", "elements.spacing", "seed", "fps"), inputs=(),
         methods=("synth.elements.arrangement", "synth.elements.school", "synth.elements.simulation",
-                 "synth.elements.byhand"), make=make_exemplar, write=write_tracks, read=read_tracks)
+                 "synth.elements.handmade"), make=make_exemplar, write=write_tracks, read=read_tracks)
     made = [example]
     coarse: tuple[tuple[str, Frames], ...] = ()
     if scene.flows:
@@ -358,8 +372,8 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
     elif scene.coarse is not None:
         made.append(Product(
             name="coarse", stage="synth", folder="fields", suffix=_npz, animated=False,
-            reads=("coarse", "elements.count", "frames", "seed", "fps"), inputs=(("exemplar", "once"),),
-            methods=("synth.elements.simulation",), make=make_coarse, write=write_tracks, read=read_tracks))
+            reads=("coarse", "elements.count", "elements.spacing", "frames", "seed", "fps"), inputs=(("exemplar", "once"),),
+            methods=("synth.elements.simulation", "synth.elements.scraps", "synth.elements.bundle"), make=make_coarse, write=write_tracks, read=read_tracks))
         coarse = (("coarse", "once"),)
     made.append(Product(
         name="elements", stage="synth", folder="fields", suffix=_npz, animated=False,

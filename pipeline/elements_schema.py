@@ -65,7 +65,8 @@ class SheetExemplar(Table):
     """A few sheets of paper (figure 13a, b)."""
 
     kind: Literal["papers"] = key("sheets")
-    style: Literal["simulated", "folded"] = key("cloth in the wind (figure 13a), or folded by hand (13b)", "simulated")
+    style: Literal["simulated", "folded", "fluttering"] = key(
+        "in turbulent air (figure 13a), or by hand: folding, or waves along them (13b)", "simulated")
     frames: int = key("of the exemplar", 60, "frames", ge=2, le=10000)
 
 
@@ -84,7 +85,7 @@ ElementsExemplar = ArrangedExemplar | DotsExemplar | ShoalExemplar | ThreadExemp
 class CarriedThreads(Table):
     """C of noodles: the motion of one is that of all, beside each other (§6.2)."""
 
-    kind: Literal["lifted", "poured"] = key("lifted from a plate, or poured onto it")
+    kind: Literal["lifted"] = key("a bundle lifted from a plate (figure 10a)")
 
 
 class CarriedSheets(Table):
@@ -119,7 +120,8 @@ class Elements(Table):
     """The output. Heights are those of the domain, which is 1 high, its floor at y = 0, centred on x = 0 and z = 0."""
 
     size: Grid = grid("columns and rows of the grid on which domain, obstacles and flow are known", (256, 256))
-    spacing: float = key("nearest distance of elements, to which the exemplar is scaled", 0.03, "heights", gt=0, le=1)
+    spacing: float = key("nearest distance of elements, of sheets that of their samples: to it the exemplar is scaled",
+                         0.03, "heights", gt=0, le=1)
     count: int = key("of elements; 0: as dense as the exemplar, of threads and sheets 200", 0, ge=0, le=100000)
     domain: Annotated[Obstacle, Field(discriminator="kind")] | None = key(
         "a table with the keys of one of [[obstacles]]: elements stay inside; none: the whole domain", None)

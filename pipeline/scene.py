@@ -405,7 +405,7 @@ LOOKS = {"noodles": "noodles", "papers": "papers", "shoal": "shoal"}
 def _element_kinds(scene: ElementsScene) -> Faults:
     """Exemplar, coarse motion and picture of one topology, in a domain of the exemplar's dimension."""
     exemplar, coarse, render = scene.exemplar.kind, scene.coarse, scene.render.kind
-    threads = {"noodles": ("lifted", "poured", "tracks"), "papers": ("gust", "tracks")}
+    threads = {"noodles": ("lifted", "tracks"), "papers": ("gust", "tracks")}
     if exemplar in threads:
         if coarse is None or coarse.kind not in threads[exemplar]:
             yield "coarse.kind", f'of {exemplar} is one of {", ".join(threads[exemplar])}'
