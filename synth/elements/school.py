@@ -163,7 +163,6 @@ def _simulated(school: _School, frames: int, rate: float, rng: np.random.Generat
     """Tracks (frames, E, 3) float64 of the school, spacings; symplectic Euler, STEPS a frame."""
     wander, carry = _wandering(rng, len(school.start)), _carrying(rng, school.extent)
     place, velocity = school.start.copy(), np.zeros_like(school.start)
-    apart = school.room[:, None] + school.room[None]
     step = 1 / (rate * STEPS)
     before = int(np.ceil(BEFORE / step))
     tracks = np.empty((frames, *place.shape))
@@ -172,7 +171,7 @@ def _simulated(school: _School, frames: int, rate: float, rng: np.random.Generat
             tracks[(k - before) // STEPS] = place
         time = (k - before) * step
         sought = school.calm[:, None] * (wander(time) + carry(place, time))
-        push = _yielding(place, school.extent, apart)
+        push = _yielding(place, school.extent, school.room)
         if school.centre is not None:
             centre, moved, quickened = school.centre(time)
             sought += moved
@@ -182,15 +181,23 @@ def _simulated(school: _School, frames: int, rate: float, rng: np.random.Generat
     return tracks
 
 
-def _yielding(place: np.ndarray, extent: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Accelerations (E, 3) away from fish nearer than `apart` (E, E), which count as nearer ahead than beside."""
-    between = place[:, None] - place[None]
-    between -= extent * np.rint(between / extent)
-    between[..., 0] /= AHEAD
-    distance = np.linalg.norm(between, axis=-1)
-    np.fill_diagonal(distance, np.inf)
-    share = np.clip(1 - distance / apart, 0, None) / np.maximum(distance, 1e-6)
-    return YIELD * (share[..., None] * between).sum(1)
+def _yielding(place: np.ndarray, extent: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """Accelerations (E, 3) away from fish that are nearer than the sum of both rooms (E,); one ahead counts as nearer
+    than one beside."""
+    squeezed = np.array([AHEAD, 1.0, 1.0])
+    box = extent / squeezed
+    # rounding may give the box's own length, which is its beginning
+    inside = (place / squeezed) % box
+    inside[inside >= box] = 0
+    tree = cKDTree(inside, boxsize=box)
+    pairs = tree.query_pairs(2 * room.max(), output_type="ndarray")
+    one, other = pairs[np.lexsort(pairs.T)].T  # one order of the sums
+    between = inside[one] - inside[other]
+    between -= box * np.rint(between / box)
+    distance = np.maximum(np.linalg.norm(between, axis=1), 1e-6)
+    force = YIELD * (np.clip(1 - distance / (room[one] + room[other]), 0, None) / distance)[:, None] * between
+    return np.stack([np.bincount(one, force[:, axis], len(place)) - np.bincount(other, force[:, axis], len(place))
+                     for axis in range(3)], 1)
 
 
 def _confining(offset: np.ndarray, radii: np.ndarray | None) -> np.ndarray:
