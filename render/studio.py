@@ -84,6 +84,23 @@ def raised(elevation: float) -> Camera:
     return Camera((x, y + away * float(np.sin(angle)), z + away * float(np.cos(angle))), CAMERA.target, CAMERA.fov)
 
 
+def framing(low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) -> Camera:
+    """The camera moved, looking the same way through the same lens, until a box from `low` to `high` (3,) just fills
+    the middle of a picture of `aspect`, its width over its height."""
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    ahead = np.array(camera.target) - np.array(camera.position)
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, ahead)
+    corners = 0.5 * (high - low) * (np.indices((2, 2, 2)).reshape(3, -1).T * 2 - 1)
+    half = FILLED * np.tan(np.radians(camera.fov) / 2)
+    away = float((np.maximum(np.abs(corners @ right) / aspect, np.abs(corners @ up)) / half - corners @ ahead).max())
+    middle = (low + high) / 2
+    x, y, z = (float(c) for c in middle - away * ahead)
+    return Camera((x, y, z), (float(middle[0]), float(middle[1]), float(middle[2])), camera.fov)
+
+
 def placed(vertices: np.ndarray, low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) -> np.ndarray:
     """Vertices (N, 3) moved and scaled so that a box from `low` to `high` (3,) fills the middle of a picture.
 

@@ -82,3 +82,19 @@ def test_a_placed_box_fills_the_middle_of_the_picture() -> None:
     assert corners.mean(0) == pytest.approx(camera.target, abs=1e-6)
     assert np.ptp(corners[:, 0]) == pytest.approx(studio.FILLED * 1.5 * view)  # twice as wide as high: width decides
     assert np.ptp(corners[:, 1]) == pytest.approx(studio.FILLED * 0.75 * view)
+
+
+def test_a_framed_box_is_seen_whole_and_fills_the_picture() -> None:
+    low, high = np.array([3.0, -1.0, 2.0]), np.array([5.0, 0.5, 4.0])
+    camera = studio.framing(low, high, studio.CAMERA, 1.5)
+    corners = low + np.indices((2, 2, 2)).reshape(3, -1).T * (high - low)
+    rays = camera.rays(3, 2).reshape(2, 3, 3)
+    ahead = np.array(camera.target) - np.array(camera.position)
+    ahead /= np.linalg.norm(ahead)
+    right, up = rays[0, 2] - rays[0, 1], rays[0, 1] - rays[1, 1]
+    seen = corners - np.array(camera.position)
+    seen /= (seen @ ahead)[:, None]
+    across, above = seen @ right / (right @ right) / 1.5, seen @ up / (up @ up)  # 1 pixel is 1 / 1.5 of half a picture
+    assert max(np.abs(across).max(), np.abs(above).max()) == pytest.approx(studio.FILLED, rel=1e-6)
+    old = np.array(studio.CAMERA.target) - np.array(studio.CAMERA.position)
+    assert ahead == pytest.approx(old / np.linalg.norm(old))

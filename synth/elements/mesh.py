@@ -405,7 +405,7 @@ def _fins(detail: int) -> list[_Template]:
     zero = np.zeros_like(across)
     tail = _fin(np.stack([zero + 0.84, 0.020 * across, zero], 1),
                 np.stack([0.915 + 0.085 * np.abs(across) ** 1.3, 0.125 * across, zero], 1), 2 * detail)
-    return [tail, _median(0.36, 0.60, BACK, 1, 0.075, 0.060, detail),
+    return [tail, _median(0.36, 0.60, BACK, 1, 0.056, 0.055, detail),
             _median(0.63, 0.76, BELLY, -1, 0.045, 0.035, detail),
             *(_paired(0.235, -0.030, side, (0.115, -0.045, 0.060), detail) for side in (1, -1)),
             *(_paired(0.43, -0.085, side, (0.070, -0.040, 0.018), detail) for side in (1, -1))]
@@ -457,9 +457,9 @@ def _eye(detail: int, side: int) -> _Template:
 def _painted(paint: np.ndarray, colour: np.ndarray) -> np.ndarray:
     """Colours (E, V, 3) sRGB of fish whose flanks are `colour` (E, 3)."""
     grey = colour.mean(1, keepdims=True)
-    back = 0.42 * colour + 0.04 * (grey + np.array([0.0, 0.6, 1.0]))
+    back = 0.32 * colour + 0.04 * (grey + np.array([0.0, 0.6, 1.0]))
     belly = np.clip(0.35 * colour + 0.66, 0, 0.97)
-    fin = np.clip(0.75 * colour + 0.06, 0, 1)
+    fin = np.clip(0.60 * colour + 0.04, 0, 1)
     palette = np.stack([back, colour, belly, fin], 1)
     painted = np.einsum("vk,ekc->evc", paint[:, :4], palette, optimize=True)
     eye = paint[:, 4]
