@@ -27,6 +27,7 @@ TABLE = (0.068, 0.078, 0.088)
 TABLE_LEVEL = -0.052  # y, below the plate's well
 GLAZE = (0.70, 0.685, 0.66)
 PLATE = 0.86  # radius
+MARGIN = 1.45  # of a plate's radius over the noodles' reach
 BOUNCES = 2
 
 # dough
@@ -54,6 +55,19 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settin
     vertices (N, 3) float32, world units; faces (M, 3) int, closed tubes; colours (N, 3) uint8, sRGB.
     """
     return _traced(vertices, faces, colours, settings, TABLE_LEVEL, settings.plate)
+
+
+def view(low: np.ndarray, high: np.ndarray, aspect: float) -> tuple[studio.Camera, float]:
+    """The camera, and the radius of a plate, for noodles that a box from `low` to `high` (3,) holds in all frames.
+
+    aspect  width of the picture over its height
+    The plate stays where it is, round x = z = 0, and all of it is in the picture.
+    """
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    radius = MARGIN * float(np.abs(np.stack([low, high])[:, [0, 2]]).max())
+    dish = np.array([[-radius, TABLE_LEVEL, -radius], [radius, 0.1 * radius, radius]])
+    camera = studio.framing(np.minimum(low, dish[0]), np.maximum(high, dish[1]), CAMERA, aspect)
+    return camera, radius
 
 
 def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,

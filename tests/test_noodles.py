@@ -35,6 +35,16 @@ def test_an_inset_does_not_depend_on_where_the_exemplar_is() -> None:
     assert first.mean((0, 1)) == pytest.approx(moved.mean((0, 1)), rel=0.01)
 
 
+def test_a_view_shows_the_whole_plate() -> None:
+    camera, radius = noodles.view(np.array([-0.2, 0.0, -0.1]), np.array([0.3, 0.9, 0.2]), 16 / 9)
+    assert radius == pytest.approx(noodles.MARGIN * 0.3)
+    m = rods()
+    seen = noodles.picture(m.vertices - 50, m.faces, m.colours, noodles.Settings(64, 36, 9, 1, radius, camera))
+    bare = noodles.picture(m.vertices - 50, m.faces, m.colours, noodles.Settings(64, 36, 9, 1, 0.0, camera))
+    dish = seen.mean(-1) > 2.5 * bare.mean(-1)
+    assert dish.any() and not (dish[0] | dish[-1]).any() and not (dish[:, 0] | dish[:, -1]).any()
+
+
 def test_the_plate_is_closed_below_flat_where_noodles_lie_and_above_the_table() -> None:
     made = noodles.plate(0.8)
     radius = np.linalg.norm(made.vertices[:, [0, 2]], axis=1)
