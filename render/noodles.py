@@ -12,7 +12,7 @@ World units: the plate's well is at y = 0, a plate of noodles about one unit wid
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -54,7 +54,9 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settin
 
     vertices (N, 3) float32, world units; faces (M, 3) int, closed tubes; colours (N, 3) uint8, sRGB.
     """
-    return _traced(vertices, faces, colours, settings, TABLE_LEVEL, settings.plate)
+    vertices, camera, scale = studio.in_studio(vertices, settings.camera, CAMERA)
+    at = (-settings.camera.target[0] * scale, -settings.camera.target[2] * scale)
+    return _traced(vertices, faces, colours, replace(settings, camera=camera), TABLE_LEVEL, settings.plate * scale, at)
 
 
 def view(low: np.ndarray, high: np.ndarray, aspect: float) -> tuple[studio.Camera, float]:
@@ -81,8 +83,8 @@ def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.
 
 
 def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settings: Settings, level: float,
-            radius: float) -> np.ndarray:
-    """Noodles over a table at y = level, and on a plate if its radius is not 0."""
+            radius: float, at: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+    """Noodles over a table at y = level, and on a plate at x and z if its radius is not 0."""
     mi = backend.mitsuba("llvm_ad_rgb")
     scene = {
         "type": "scene",
@@ -95,7 +97,7 @@ def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settin
             "specular": 0.35}}),
     }
     if radius:
-        scene["plate"] = surface.plain(mi, "plate", plate(radius), {
+        scene["plate"] = surface.plain(mi, "plate", plate(radius, at), {
             "type": "principled", "base_color": {"type": "rgb", "value": list(GLAZE)}, "roughness": 0.42,
             "specular": 0.5, "clearcoat": 0.5, "clearcoat_gloss": 0.9})
     light = mi.render(mi.load_dict(scene), integrator=surface.every_lamp(mi, BOUNCES), spp=settings.spp,
@@ -119,8 +121,8 @@ def table(level: float) -> studio.Mesh:
                        studio.backdrop().faces)
 
 
-def plate(radius: float) -> studio.Mesh:
-    """A shallow plate: foot, underside, lip, slope and a flat well at y = 0."""
+def plate(radius: float, at: tuple[float, float] = (0.0, 0.0)) -> studio.Mesh:
+    """A shallow plate at x and z: foot, underside, lip, slope and a flat well at y = 0."""
     r, low = radius, TABLE_LEVEL
     wall = 0.020
     lip = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(-0.4, 0.7, 14) * np.pi]) * 0.5 * wall
@@ -131,5 +133,6 @@ def plate(radius: float) -> studio.Mesh:
     outside = np.stack([0.52 * r + (0.985 - 0.52) * r * share, low + 0.012 + (rise - 0.02 - low) * share**1.6], 1)
     inside = np.stack([0.975 * r + (well - 0.975 * r) * share, rise * (1 - ease) ** 1.25], 1)
     foot = np.array([[0.0, low + 0.002], [0.46 * r, low + 0.002], [0.50 * r, low], [0.515 * r, low + 0.004]])
-    return studio.revolved(np.concatenate([foot, outside, np.array([[0.985 * r, rise - 0.004]]) + lip, inside,
+    made = studio.revolved(np.concatenate([foot, outside, np.array([[0.985 * r, rise - 0.004]]) + lip, inside,
                                            [[0.3 * r, 0.0], [0.0, 0.0]]]), segments=256)
+    return studio.Mesh(made.vertices + np.array([at[0], 0.0, at[1]], np.float32), made.faces)

@@ -8,7 +8,7 @@ World units: floor at y = 0, the scene about one unit high, centred on x = z = 0
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -44,7 +44,8 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settin
 
     vertices (N, 3) float32, world units; faces (M, 3) int, sheets of one layer; colours (N, 3) uint8, sRGB.
     """
-    return _traced(vertices, faces, colours, settings, 0.0)
+    vertices, camera, _ = studio.in_studio(vertices, settings.camera, CAMERA)
+    return _traced(vertices, faces, colours, replace(settings, camera=camera), 0.0)
 
 
 def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,

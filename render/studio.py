@@ -101,6 +101,18 @@ def framing(low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) ->
     return Camera((x, y, z), (float(middle[0]), float(middle[1]), float(middle[2])), camera.fov)
 
 
+def in_studio(vertices: np.ndarray, camera: Camera, usual: Camera) -> tuple[np.ndarray, Camera, float]:
+    """Vertices (N, 3) and camera scaled until the camera sees as much as the `usual` one, and moved until what it looks
+    at is over x = z = 0; and the scale. So lamps and backdrop suit subjects of any size; the floor stays at y = 0."""
+    seen = [float(np.linalg.norm(np.array(c.position) - np.array(c.target)) * np.tan(np.radians(c.fov) / 2))
+            for c in (camera, usual)]
+    scale = seen[1] / seen[0]
+    shift = np.array([camera.target[0], 0.0, camera.target[2]])
+    x, y, z = (float(c) for c in (np.array(camera.position) - shift) * scale)
+    moved = Camera((x, y, z), (0.0, camera.target[1] * scale, 0.0), camera.fov)
+    return ((vertices - shift) * scale).astype(np.float32), moved, scale
+
+
 def placed(vertices: np.ndarray, low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) -> np.ndarray:
     """Vertices (N, 3) moved and scaled so that a box from `low` to `high` (3,) fills the middle of a picture.
 

@@ -34,6 +34,15 @@ def test_an_inset_shows_the_exemplar_large() -> None:
     assert 0.75 < np.ptp(np.flatnonzero(changed.any(0))) / 64 < 0.9
 
 
+def test_the_studio_is_as_large_as_what_it_shows() -> None:
+    m = flying()
+    first = papers.picture(m.vertices, m.faces, m.colours, SMALL)
+    large = studio.Camera((2.0, 3 * 0.74, 3 * 5.4 + 1), (2.0, 3 * 0.46, 1.0), papers.CAMERA.fov)
+    moved = (3 * m.vertices + [2.0, 0.0, 1.0]).astype(np.float32)
+    second = papers.picture(moved, m.faces, m.colours, papers.Settings(64, 36, 9, camera=large))
+    assert np.abs(first - second).mean() < 0.01 * first.mean()  # but for rounding
+
+
 @pytest.mark.parametrize("behind", [True, False])
 def test_a_sheet_sends_light_on_and_back(behind: bool) -> None:
     """A white sheet before a lamp, and with the lamp beside the eye: both bright, more comes back than through."""
