@@ -16,6 +16,7 @@ sooner to one ahead or behind than to one beside it. All these forces are contin
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -33,6 +34,8 @@ BEFORE = 6.0  # seconds that pass before the first frame
 RESPONSE = 0.45  # seconds in which a fish takes on the velocity that it seeks
 YIELD = 14.0  # spacings per s²: of two fish in one place
 CONFINE = 8.0  # spacings per s², one radius outside of a group
+DARTS = 0.15  # by how much more room a fish has, in shares, for each spacing per second at which it darts
+CLOSE, DRAWS = 0.4, 10  # spacings: darts are drawn again while fish brush past one another nearer than that
 WANDER = np.array([0.26, 0.13, 0.30])  # rms of a fish's own velocity x, y, z, spacings per second
 CARRY = 0.26  # rms of the shared flow, spacings per second
 SILVER, AMBER = (0.55, 0.66, 0.74), (0.88, 0.56, 0.26)
@@ -79,7 +82,7 @@ def crossing(count: int = 32, frames: int = 60, *, groups: int = 2, crossers: in
     The rest as `homogeneous`. Raises ValueError too for a group of fewer than 6, more crossers than half of all,
     or a clip shorter than a crossing.
     """
-    _check(count, frames, spacing, speed, rate)
+    _check(count, frames, spacing, speed, rate, slowest=2.5)
     if groups < 2 or count < 6 * groups:
         raise ValueError(f"{count} fish do not make {groups} groups: at least 2 of 6 or more")
     if not 0 <= crossers <= count // 2:
@@ -93,17 +96,32 @@ def crossing(count: int = 32, frames: int = 60, *, groups: int = 2, crossers: in
     extent = np.array([2 * radii[0] + 1.5, 2 * radii[1] + 1.5, groups * (2 * radii[2] + 1.3)])
     middle = np.stack([np.full(groups, extent[0] / 2), np.full(groups, extent[1] / 2),
                        (np.arange(groups) + 0.5) * extent[2] / groups], 1)[group]
-    start = middle + rng.uniform(-0.6, 0.6, (count, 3)) * radii
-    # who crosses is at the rim of its group or within it, as it happens; to the next group and, of two, back
-    leaves = np.full(count, np.inf)
-    leaves[:crossers] = rng.permutation((np.arange(crossers) + rng.uniform(0.2, 0.8, crossers)) / max(crossers, 1))
-    leaves = leaves * ((frames - 1) / rate - crossing_time * 0.9) - crossing_time * 0.05
     way = np.array([speed * crossing_time * 0.35, 0.0, extent[2] / groups])
+    # to the next group and, of two, back
     side = np.where((group == 1) & (groups == 2), -1.0, 1.0)[:, None] * np.array([0, 0, 1]) + np.array([1, 1, 0])
-    school = _School(extent, start, np.full(count, 0.55), np.ones(count),
-                     lambda time: _crossed(middle, leaves, side * way, crossing_time, time), radii)
-    length = LENGTH * rng.normal(1, 0.05, count).clip(0.85, 1.15)
-    return _shown(school, frames, spacing, speed, rate, rng, length, np.zeros(count, int))
+    drawn: list[tuple[Elements, float]] = []
+    apart: list[float] = []
+    while len(drawn) < DRAWS and max(apart, default=0) < CLOSE:
+        start = middle + rng.uniform(-0.6, 0.6, (count, 3)) * radii
+        # who crosses is at the rim of its group or within it, as it happens
+        leaves = np.full(count, np.inf)
+        leaves[:crossers] = (rng.permutation(crossers) + rng.uniform(0.2, 0.8, crossers)) / max(crossers, 1)
+        leaves = leaves * ((frames - 1) / rate - crossing_time * 0.9) - crossing_time * 0.05
+        school = _School(extent, start, np.full(count, 0.55), np.ones(count),
+                         functools.partial(_crossed, middle, leaves, side * way, crossing_time), radii)
+        length = LENGTH * rng.normal(1, 0.05, count).clip(0.85, 1.15)
+        drawn.append(_shown(school, frames, spacing, speed, rate, rng, length, np.zeros(count, int)))
+        apart.append(_nearest(drawn[-1][0]) / spacing)
+    return drawn[int(np.argmax(apart))]
+
+
+def _nearest(elements: Elements) -> float:
+    """The least distance of two fish in all frames, world units, on the torus."""
+    points = elements.positions[:, :, 0].astype(np.float64)
+    period = np.asarray(elements.period, np.float64)
+    inside = points % period
+    inside[inside >= period] = 0
+    return min(float(cKDTree(frame, boxsize=period).query(frame, k=2)[0][:, 1].min()) for frame in inside)
 
 
 def mixed(count: int = 44, large: int = 3, frames: int = 60, *, size: float = 3.0, spacing: float = 1.0,
@@ -130,14 +148,14 @@ def mixed(count: int = 44, large: int = 3, frames: int = 60, *, size: float = 3.
     return _shown(school, frames, spacing, speed, rate, rng, length, kind)
 
 
-def _check(count: int, frames: int, spacing: float, speed: float, rate: float) -> None:
+def _check(count: int, frames: int, spacing: float, speed: float, rate: float, slowest: float = 1.5) -> None:
     if count < 8 or frames < 2:
         raise ValueError(f"a shoal has 8 fish or more over 2 frames or more, not {count} over {frames}")
     for name, value in (("spacing", spacing), ("rate", rate)):
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"{name} = {value} is not above 0")
-    if not (np.isfinite(speed) and speed >= 1.5):
-        raise ValueError(f"speed = {speed} spacings per second: below 1.5 fish may drift backwards")
+    if not (np.isfinite(speed) and speed >= slowest):
+        raise ValueError(f"speed = {speed} spacings per second: below {slowest} fish may swim backwards")
 
 
 def _box(volume: float) -> np.ndarray:
@@ -171,11 +189,14 @@ def _simulated(school: _School, frames: int, rate: float, rng: np.random.Generat
             tracks[(k - before) // STEPS] = place
         time = (k - before) * step
         sought = school.calm[:, None] * (wander(time) + carry(place, time))
-        push = _yielding(place, school.extent, school.room)
+        room, push = school.room, np.zeros_like(place)
         if school.centre is not None:
             centre, moved, quickened = school.centre(time)
             sought += moved
             push += quickened + _confining(place - centre, school.radii)
+            # others see a fish that darts from afar
+            room = room * (1 + DARTS * np.linalg.norm(moved, axis=1))
+        push += _yielding(place, school.extent, room)
         velocity += step * ((sought - velocity) / RESPONSE + push)
         place = place + step * velocity
     return tracks
