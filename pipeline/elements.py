@@ -131,7 +131,7 @@ def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
         raise ValueError(f"the exemplar has {example.dimensions} dimensions, the domain {scene.dimension}")
     within = search.exemplar(example, _shape(scene, wanted.spacing), period=_period(example))
     region = domain(scene, stock)
-    flow, turn, allowed = _flow(scene, stock), _turn(scene, stock), _allowed(scene)
+    flow, turn, allowed = _flow(scene, stock, region), _turn(scene, stock), _allowed(scene)
     pins = [pin for pin in wanted.pins if pin.frame == 1]
     together = scene.synthesis.sequence == "together"
     start = initialize.points(
@@ -143,8 +143,8 @@ def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
         start = initialize.carried(start, flow)
     margin = 0.5 * wanted.spacing if scene.obstacles or wanted.domain else 0.0
     return within, start, Guides(
-        Constraints(region, margin, _pins(scene, start.elements.positions), hard=margin > 0), flow, turn, allowed=allowed,
-        period=_toroidal(scene))
+        Constraints(region, margin, _pins(scene, start.elements.positions), hard=margin > 0), flow, turn,
+        allowed=allowed, period=_toroidal(scene))
 
 
 def _toroidal(scene: ElementsScene) -> np.ndarray | None:
@@ -177,13 +177,28 @@ def domain(scene: ElementsScene, stock: Stock) -> Any:
     return Domain(inside.astype(np.float32), cell, origin)
 
 
-def _flow(scene: ElementsScene, stock: Stock) -> Any:
-    """How far points are carried from a frame to the next, heights; None without a flow."""
+def _flow(scene: ElementsScene, stock: Stock, region: Any) -> Any:
+    """How far points are carried from a frame to the next, heights; None without a flow. Nothing flows out of a domain
+    that has a shape."""
     if not scene.flows:
         return None
+    from synth.motion.coarse import upsample
+    from synth.projection import project
+
+    before: list[np.ndarray] = []
+
+    def velocity(frame: int) -> np.ndarray:
+        """Heights per second; of a steady flow it is found once."""
+        values = stock.read("L", frame).values
+        if scene.elements.domain is None:
+            return values
+        if not before or not np.array_equal(before[0], values):
+            cells = scene.shape[-2]
+            before[:] = [values, project(upsample(values, scene.shape), "open", region.inside * cells)]
+        return before[1]
 
     def flow(t: int, points: np.ndarray) -> np.ndarray:
-        return _sampled(scene, stock.read("L", min(t + 1, scene.frames)).values, points) / scene.fps
+        return _sampled(scene, velocity(min(t + 1, scene.frames)), points) / scene.fps
 
     return flow
 
@@ -302,7 +317,8 @@ def make_coarse(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterat
             raise ValueError(f"coarse.file has a grid {foreign.grid} for an element, the exemplar {example.grid}")
         yield 0, foreign
         return
-    spacing, settings = scene.elements.spacing, {"frames": scene.frames, "rate": scene.fps, "seed": scene.seed}
+    spacing = scene.elements.spacing
+    settings: dict[str, Any] = {"frames": scene.frames, "rate": scene.fps, "seed": scene.seed}
     if wanted.kind == "gust":
         yield 0, _scaled(scraps.tossed(count, side=example.grid[0], **settings), spacing)
         return
@@ -372,8 +388,10 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
     elif scene.coarse is not None:
         made.append(Product(
             name="coarse", stage="synth", folder="fields", suffix=_npz, animated=False,
-            reads=("coarse", "elements.count", "elements.spacing", "frames", "seed", "fps"), inputs=(("exemplar", "once"),),
-            methods=("synth.elements.simulation", "synth.elements.scraps", "synth.elements.bundle"), make=make_coarse, write=write_tracks, read=read_tracks))
+            reads=("coarse", "elements.count", "elements.spacing", "frames", "seed", "fps"),
+            inputs=(("exemplar", "once"),),
+            methods=("synth.elements.simulation", "synth.elements.scraps", "synth.elements.bundle"), make=make_coarse,
+            write=write_tracks, read=read_tracks))
         coarse = (("coarse", "once"),)
     made.append(Product(
         name="elements", stage="synth", folder="fields", suffix=_npz, animated=False,

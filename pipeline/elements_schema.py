@@ -160,6 +160,9 @@ class BeadsRender(Table):
     width: int = key("of the picture", 800, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
     radius: float = key("of a bead of the exemplar's commonest size", 0.42, "spacings", gt=0, le=10)
+    colour: Literal["exemplar", "origin"] = key(
+        "of a bead: that of what it was copied from, or by where it is in the first frame, which shows its way",
+        "exemplar")
 
 
 class ShoalRender(Table):

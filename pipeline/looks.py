@@ -29,7 +29,7 @@ def mesh_of(scene: ElementsScene, elements: Elements, frame: int) -> Mesh:
         case "beads":
             typical = float(np.median(elements.size))
             radius = elements.size / typical * scene.render.radius * scene.elements.spacing
-            return mesh.solids(elements.positions[frame, :, 0], radius, elements.colour)
+            return mesh.solids(elements.positions[frame, :, 0], radius, _bead_colours(scene, elements))
         case "shoal":
             gait = mesh.swimming(swum(scene, elements), elements.size, elements.rate, scene.seed)
             return mesh.fish(elements.positions[frame, :, 0], gait.heading[frame], elements.size, elements.colour,
@@ -38,6 +38,21 @@ def mesh_of(scene: ElementsScene, elements: Elements, frame: int) -> Mesh:
             return mesh.tubes(elements.positions[frame], elements.size, elements.colour)
     rows, columns = elements.grid
     return mesh.sheets(elements.positions[frame].reshape(elements.count, rows, columns, 3), elements.colour)
+
+
+ORIGINS = np.array([[0.10, 0.32, 0.42], [0.16, 0.55, 0.58], [0.93, 0.78, 0.42], [0.90, 0.48, 0.26], [0.62, 0.16, 0.20]])
+"""Colours of beads from left to right in the first frame, sRGB: petrol, teal, sand, orange, madder."""
+
+
+def _bead_colours(scene: ElementsScene, elements: Elements) -> np.ndarray:
+    """Colours (E, 3) of the beads; an exemplar has those of the middle."""
+    if scene.render.kind != "beads" or scene.render.colour == "exemplar":
+        return elements.colour
+    if elements.box is not None:
+        return np.broadcast_to(ORIGINS[len(ORIGINS) // 2], (elements.count, 3))
+    x = elements.positions[0, :, 0, 0]
+    share = (np.argsort(np.argsort(x, kind="stable"), kind="stable") + 0.5) / elements.count * (len(ORIGINS) - 1)
+    return np.stack([np.interp(share, np.arange(len(ORIGINS)), ORIGINS[:, c]) for c in range(3)], axis=-1)
 
 
 def swum(scene: ElementsScene, elements: Elements) -> np.ndarray:
@@ -188,7 +203,7 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
     """The meshes, the USD file, and the pictures that the figure shows."""
     solid = obstacles.inputs(scene)
     shape = ("synth.elements.mesh",)
-    mesh_keys = ("render.kind", "render.radius", "render.speed", "elements.spacing", "seed")
+    mesh_keys = ("render.kind", "render.radius", "render.colour", "render.speed", "elements.spacing", "seed")
     ground = ("elements.domain", "elements.size", "elements.toroidal")
     made = [
         Product(name="mesh", stage="bake", folder="geometry", suffix=lambda s: "ply", reads=mesh_keys,

@@ -151,12 +151,28 @@ class Works:
 
         Raises BadInput if a stage before it has not been run.
         """
-        names = dict.fromkeys(p.name for ps in self.products.values() for p in ps.values() if p.stage == stage)
+        names = self._in_order(stage)
         self._check_foreign_files(names)
         for name in names:
             for variant in self.makers(name):
                 self._make(variant, name, frames, progress)
         self._close(stage)
+
+    def _in_order(self, stage: str) -> list[str]:
+        """The names of a stage's products in all variants, each after those that it is made from in any."""
+        names: list[str] = []
+
+        def place(products: dict[str, Product], name: str) -> None:
+            for other, _ in products[name].inputs:
+                place(products, other)
+            if name not in names and products[name].stage == stage:
+                names.append(name)
+
+        # first those with most inputs: a product that another variant makes of less must not come too early
+        for products in sorted(self.products.values(), key=len, reverse=True):
+            for name in products:
+                place(products, name)
+        return names
 
     def _check_foreign_files(self, names: Iterable[str]) -> None:
         """Read every file of the user's that is still needed, before anything is written."""

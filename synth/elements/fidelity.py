@@ -1,4 +1,4 @@
-"""How like its exemplar an output is: pair correlation, motion spectrum, distance to the nearest; and jitter (ma13 §4.2).
+"""How like its exemplar an output is: pair correlation, motion spectrum, distance to the nearest; jitter (ma13 §4.2).
 
 All take positions (T, E, S, D), world units, and look at whole elements by the middle of their samples.
 """
