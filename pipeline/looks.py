@@ -108,31 +108,38 @@ def read_stage(file: Path, scene: ElementsScene) -> bytes:
 
 def make_beauty(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The output."""
+    ground, extent = _ground(scene, stock), _extent(stock.read("elements"))
     for frame in frames:
-        yield frame, _picture(scene, stock.read("mesh", frame), frame, _ground(scene, stock), scene.render.width,
+        yield frame, _picture(scene, stock.read("mesh", frame), frame, ground, extent, scene.render.width,
                               scene.render.spp)
 
 
-def _picture(scene: ElementsScene, mesh: dict[str, np.ndarray], frame: int, ground: Any, width: int, spp: int,
-             box: np.ndarray | None = None) -> np.ndarray:
-    """One picture; with a box (2, 3) that of an exemplar, which fills a square."""
-    from render import beads, noodles, papers, shoal
+def _extent(elements: Elements) -> np.ndarray:
+    """The corners (2, D) of the box that holds the elements in all frames: pictures do not follow them."""
+    return np.stack([elements.positions.min(axis=(0, 1, 2)), elements.positions.max(axis=(0, 1, 2))])
+
+
+def _picture(scene: ElementsScene, mesh: dict[str, np.ndarray], frame: int, ground: Any, extent: np.ndarray, width: int,
+             spp: int, inset: bool = False) -> np.ndarray:
+    """One picture of elements that have an extent; an inset is a square that they fill."""
+    from render import beads, noodles, papers, shoal, studio
 
     render: Any = scene.render
     if render.kind == "beads":
         return beads.picture(**mesh, ground=ground, settings=beads.Settings(width=width, spp=spp, seed=scene.seed))
-    height = round(render.height * width / render.width)
-    if box is not None:
-        height = width
+    height = width if inset else round(render.height * width / render.width)
     how: dict[str, Any] = {"width": width, "height": height, "spp": spp, "seed": scene.seed}
+    looks: dict[str, Any] = {"shoal": shoal, "noodles": noodles, "papers": papers}
+    look = looks[render.kind]
     if render.kind == "shoal":
-        look: Any = shoal
         how["time"] = frame / scene.fps
-    else:
-        look = noodles if render.kind == "noodles" else papers
+    elif not inset and render.kind == "noodles":
+        how["camera"], how["plate"] = noodles.view(extent[0], extent[1], width / height)
+    elif not inset:
+        how["camera"] = studio.framing(extent[0], extent[1], papers.CAMERA, width / height)
     settings = look.Settings(**how)
-    made: np.ndarray = (look.picture(**mesh, settings=settings) if box is None
-                        else look.inset(**mesh, low=box[0], high=box[1], settings=settings))
+    made: np.ndarray = (look.inset(**mesh, low=extent[0], high=extent[1], settings=settings) if inset
+                        else look.picture(**mesh, settings=settings))
     return made
 
 
@@ -158,8 +165,7 @@ def make_exemplar_picture(scene: ElementsScene, stock: Stock, frames: list[int])
 
     example = stock.read("exemplar")
     ground = None
-    # of all frames: the inset does not follow its elements
-    extent = np.stack([example.positions.min(axis=(0, 1, 2)), example.positions.max(axis=(0, 1, 2))])
+    extent = _extent(example)
     if scene.render.kind == "beads":
         corners = example.box if example.box is not None else extent
         ground = Ground(tuple(corners[0]), tuple(corners[1]))
@@ -169,8 +175,8 @@ def make_exemplar_picture(scene: ElementsScene, stock: Stock, frames: list[int])
         if at not in seen:
             found = mesh_of(scene, example, at)
             mesh = {"vertices": found.vertices, "faces": found.faces, "colours": found.colours}
-            seen = {at: _picture(scene, mesh, frame, ground, scene.figure.panel // 2,
-                                 max(1, round(INSET * scene.render.spp)), box=extent)}
+            seen = {at: _picture(scene, mesh, frame, ground, extent, scene.figure.panel // 2,
+                                 max(1, round(INSET * scene.render.spp)), inset=True)}
         yield frame, seen[at]
 
 
@@ -186,7 +192,7 @@ def make_coarse_picture(scene: ElementsScene, stock: Stock, frames: list[int]) -
     for frame in frames:
         found = mesh_of(scene, coarse, frame - 1)
         mesh = {"vertices": found.vertices, "faces": found.faces, "colours": found.colours}
-        yield frame, _picture(scene, mesh, frame, None, scene.figure.panel, scene.render.spp)
+        yield frame, _picture(scene, mesh, frame, None, _extent(coarse), scene.figure.panel, scene.render.spp)
 
 
 def write_light(file: Path, picture: np.ndarray, scene: ElementsScene) -> None:
@@ -212,7 +218,7 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
                 reads=mesh_keys, inputs=(("elements", "once"),), methods=shape, make=make_stage, write=write_stage,
                 read=read_stage, export=True),
         Product(name="beauty", stage="render", folder="images", suffix=lambda s: "exr",
-                reads=("render", "seed", "fps", *ground), inputs=(("mesh", "same"), *solid),
+                reads=("render", "seed", "fps", *ground), inputs=(("mesh", "same"), ("elements", "once"), *solid),
                 methods=(f"render.{scene.render.kind}",), make=make_beauty, write=write_light, read=read_light)]
     look = (f"render.{scene.render.kind}", *shape)
     pictures: dict[str, tuple[Any, tuple[tuple[str, Frames], ...], tuple[str, ...]]] = {
