@@ -23,6 +23,7 @@ from synth.elements.samples import Elements
 from synth.field import domain_origin
 
 MANY = 200  # threads or sheets, where the scene does not say how many
+LIFT = 2.5  # seconds that a lift takes at least
 NEIGHBOURS = 9  # threads that are copied side by side
 
 
@@ -49,12 +50,12 @@ def _exemplar(scene: ElementsScene) -> Elements:
             made = {"homogeneous": school.homogeneous, "crossing": school.crossing, "mixed": school.mixed}
             return made[wanted.behaviour](wanted.count, frames=wanted.frames, rate=scene.fps, seed=scene.seed)[0]
         case "noodles":
-            threads = {"simulated": simulation.noodles, "jagged": handmade.jagged}[wanted.style]
-            return threads(frames=wanted.frames, rate=scene.fps, seed=scene.seed)
+            threads: dict[str, Any] = {"simulated": simulation.noodles, "jagged": handmade.jagged}
+            return threads[wanted.style](frames=wanted.frames, rate=scene.fps, seed=scene.seed)
         case "papers":
-            sheets = {"simulated": simulation.sheets, "folded": handmade.folded,
-                      "fluttering": handmade.fluttering}[wanted.style]
-            return sheets(frames=wanted.frames, rate=scene.fps, seed=scene.seed)
+            sheets: dict[str, Any] = {"simulated": simulation.sheets, "folded": handmade.folded,
+                      "fluttering": handmade.fluttering}
+            return sheets[wanted.style](frames=wanted.frames, rate=scene.fps, seed=scene.seed)
     return tracks.read_foreign(wanted.file, "exemplar.file", rate=wanted.rate or scene.fps,
                                dimensions=scene.dimension)
 
@@ -324,7 +325,11 @@ def make_coarse(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterat
         return
     thick = float(np.linalg.norm(bundle.section(count, 1.0), axis=1).max()) + 0.5
     length = float(np.linalg.norm(np.diff(example.coarse[0, 0], axis=0), axis=-1).sum()) / spacing
-    curve = simulation.lifted(samples=example.grid[0], length=max(length, 10 * thick), thick=thick, **settings)
+    # lifted faster than that a simulation comes apart: a shorter animation shows the same lift in fewer frames
+    enough = max(scene.frames, round(LIFT * scene.fps))
+    curve = simulation.lifted(samples=example.grid[0], length=max(length, 10 * thick), thick=thick,
+                              **{**settings, "frames": enough})
+    curve = curve[np.linspace(0, enough - 1, scene.frames).round().astype(int)]
     made = _scaled(bundle.duplicated(curve, count, radius=float(np.median(example.size)) / spacing, rate=scene.fps),
                    spacing)
     alike = np.arange(count) % example.count
