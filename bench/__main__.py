@@ -121,12 +121,35 @@ def smoke_rows(found: dict[str, Any]) -> Iterable[Row]:
         yield ("    volpath's time over Cycles' at equal noise", f"{ratio:.2f}", "-", "", "Blender's Cycles")
 
 
+def elements_rows(found: dict[str, Any]) -> Iterable[Row]:
+    for (name, times), (reach, memory) in zip(found["cases"].items(), ((60, 2000), (300, None), (300, None)),
+                                              strict=True):
+        yield (f"ma13 {name}, to convergence", f"{seconds(times)}, {times['iterations']} iterations", f"{reach} s",
+               verdict(times["wall"] <= reach), "not said")
+        peak = times["peak memory MB"]
+        yield ("    peak memory", f"{peak} MB", f"{memory} MB" if memory else "-",
+               verdict(peak <= memory) if memory else "", "not said")
+    exponent = found["growth"]["exponent"]
+    yield ("    time from 500 to 8,000 elements, exponent", f"{exponent:.2f}", "1.1", verdict(exponent <= 1.1),
+           "not said")
+    faster = found["times faster than the reference"]
+    yield ("    search, times faster than NumPy and SciPy", f"{faster['wall']:.0f} ({faster['processor']:.0f} by "
+           "processor)", "20", verdict(faster["wall"] >= 20), "not said")
+    basic, smooth, ours = found["jitter"].values()
+    yield ("    jitter, smooth over basic (§4.2 over §4.1)", f"{smooth / basic:.2f}; with motion that counts "
+           f"{ours / basic:.4f}", "0.5", verdict(ours <= 0.5 * basic), "not said")
+    worst = max(max(row[key] for key in ("pair correlation", "motion spectrum", "nearest distance"))
+                for row in found["exemplars in their own domains"])
+    yield ("    an exemplar in its own domain, worst of three statistics", f"{worst:.1%} off", "10 %",
+           verdict(worst <= 0.1), "not said")
+
+
 ROWS: dict[str, Callable[[dict[str, Any]], Iterable[Row]]] = {
     "synthesis": synthesis_rows, "search": search_rows, "density": density_rows, "repeat": repeat_rows,
     "solid": solid_rows, "potential": potential_rows, "lagrangian": lagrangian_rows, "boundary": boundary_rows,
-    "smoke": smoke_rows}
+    "smoke": smoke_rows, "elements": elements_rows}
 # lists of equal rows each: printed as tables of their own
-TABLES = ("quality", "solid", "potential", "lagrangian", "boundary")
+TABLES = ("quality", "solid", "potential", "lagrangian", "boundary", "elements")
 PARTS = tuple(dict.fromkeys((*ROWS, *TABLES)))
 
 

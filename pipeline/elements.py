@@ -175,7 +175,7 @@ def domain(scene: ElementsScene, stock: Stock) -> Any:
         inside = np.minimum(inside, stock.read("solid").values)
     if not (inside > 0).any():
         raise ValueError("the domain is empty: obstacles fill it, or its shape lies outside")
-    return Domain(inside.astype(np.float32), cell, origin)
+    return Domain(inside.astype(np.float32), cell, origin, _toroidal(scene))
 
 
 def _flow(scene: ElementsScene, stock: Stock, region: Any) -> Any:
@@ -199,7 +199,9 @@ def _flow(scene: ElementsScene, stock: Stock, region: Any) -> Any:
         return before[1]
 
     def flow(t: int, points: np.ndarray) -> np.ndarray:
-        return _sampled(scene, velocity(min(t + 1, scene.frames)), points) / scene.fps
+        """By the midpoint rule: a step along the tangent would spiral out of every vortex."""
+        field = velocity(min(t + 1, scene.frames)) / scene.fps
+        return _sampled(scene, field, points + 0.5 * _sampled(scene, field, points))
 
     return flow
 

@@ -29,7 +29,7 @@ def mesh_of(scene: ElementsScene, elements: Elements, frame: int) -> Mesh:
         case "beads":
             typical = float(np.median(elements.size))
             radius = elements.size / typical * scene.render.radius * scene.elements.spacing
-            return mesh.solids(elements.positions[frame, :, 0], radius, _bead_colours(scene, elements))
+            return mesh.solids(_in_domain(scene, elements.positions[frame, :, 0]), radius, _bead_colours(scene, elements))
         case "shoal":
             gait = mesh.swimming(swum(scene, elements), elements.size, elements.rate, scene.seed)
             return mesh.fish(elements.positions[frame, :, 0], gait.heading[frame], elements.size, elements.colour,
@@ -53,6 +53,14 @@ def _bead_colours(scene: ElementsScene, elements: Elements) -> np.ndarray:
     x = elements.positions[0, :, 0, 0]
     share = (np.argsort(np.argsort(x, kind="stable"), kind="stable") + 0.5) / elements.count * (len(ORIGINS) - 1)
     return np.stack([np.interp(share, np.arange(len(ORIGINS)), ORIGINS[:, c]) for c in range(3)], axis=-1)
+
+
+def _in_domain(scene: ElementsScene, points: np.ndarray) -> np.ndarray:
+    """Points (M, 2) of a domain that repeats along x, in its one unit."""
+    if not scene.elements.toroidal:
+        return points
+    width = scene.cells[0] / scene.cells[1]
+    return np.stack([np.mod(points[:, 0] + width / 2, width) - width / 2, points[:, 1]], axis=-1)
 
 
 def swum(scene: ElementsScene, elements: Elements) -> np.ndarray:

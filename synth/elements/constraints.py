@@ -11,6 +11,7 @@ import numpy as np
 from scipy import ndimage
 
 from synth.elements.assignment import Anchors
+from synth.elements.neighborhood import wrapped
 
 CORNERS = 4  # times that a sample is put on the nearest border: in a corner it then lies beyond another
 PULL = 4.0  # weight of a sample that is out of its domain, in terms of Eq. 7
@@ -23,15 +24,22 @@ class Domain:
     inside  (Y, X) or (Z, Y, X) float32, world units; cell centres at origin + cell * (x, y[, z])
     cell    edge of a cell, world units
     origin  (D,) position of the first cell's centre
+    period  (D,) along axes where the grid repeats, 0 along those where it ends; None: it ends along all
     """
 
     inside: np.ndarray
     cell: float
     origin: np.ndarray
+    period: np.ndarray | None = None
+
+    def wrapped(self, points: np.ndarray) -> np.ndarray:
+        """The points in the one unit that the grid covers."""
+        low = self.origin - self.cell / 2
+        return low + wrapped(points - low, self.period)
 
     def distance(self, points: np.ndarray) -> np.ndarray:
         """Signed distance to the border at points (M, D), positive inside."""
-        return self._sampled(self.inside, points)
+        return self._sampled(self.inside, points) - self._beyond(points)
 
     def slope(self, points: np.ndarray) -> np.ndarray:
         """Unit vectors towards the inside at points, (M, D)."""
@@ -40,8 +48,17 @@ class Domain:
         return direction / np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-9)
 
     def _sampled(self, values: np.ndarray, points: np.ndarray) -> np.ndarray:
-        at = ((points - self.origin) / self.cell)[:, ::-1].T
+        at = ((self.wrapped(points) - self.origin) / self.cell)[:, ::-1].T
         return ndimage.map_coordinates(values, at, order=1, mode="nearest")
+
+    def _beyond(self, points: np.ndarray) -> np.ndarray:
+        """How far points lie beyond the outermost cells' centres, (M,)."""
+        at = (self.wrapped(points) - self.origin) / self.cell
+        last = np.array(self.inside.shape[::-1]) - 1
+        away = at - np.clip(at, 0, last)
+        if self.period is not None:
+            away[:, self.period > 0] = 0.0
+        return self.cell * np.linalg.norm(away, axis=1)
 
     def outside(self, points: np.ndarray, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Indices of the points nearer than `margin` to the border or beyond it, and where each would be inside."""

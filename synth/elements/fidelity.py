@@ -9,10 +9,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 BINS = 24  # of the pair correlation, up to REACH
 REACH = 3.0  # nearest distances
+SMOOTH = 0.75  # bins, by which it is smoothed: small exemplars have few pairs
 FRAMES = 12  # of an animation that are looked at, at most
 
 
@@ -60,6 +62,7 @@ def statistics(positions: np.ndarray, spacing: float, period: np.ndarray | None 
     if not asked:
         raise ValueError("no element lies deep enough in the domain to be looked at")
     edges = np.linspace(0, reach, BINS + 1)
+    counts = ndimage.gaussian_filter1d(counts, SMOOTH, mode="nearest")
     shell = np.diff(edges ** points.shape[2])
     # normed by how many there are within REACH: the density is asked for apart
     correlation = counts / asked / shell * reach ** points.shape[2] / max(float(np.mean(density)), 1e-9)

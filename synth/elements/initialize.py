@@ -11,9 +11,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from synth.elements.constraints import Domain
+from synth.elements.neighborhood import wrapped
 from synth.elements.samples import Elements
 
 TRIES = 24  # patches that are looked at for each place
+GO_ON = 4  # of the nearest patches before it, which it may go on
+CONTINUE = 0.02  # misfit by which chance must fit worse for that: a copy of the whole exemplar is no new arrangement
+SAME = 0.15  # of the spacing: nearer than that, two elements are one and the same
 CLOSE = 0.6  # of the spacing: nearer than that, an element of a patch is left out
 FILL_TRIES = 40  # points tried, for each element that is missing
 JUMP_WITHIN = 0.6  # of the exemplar's frames: a track that has come to its end goes on before this
@@ -57,14 +61,17 @@ def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spaci
     if len(placed) > expected:
         raise ValueError(f"{len(placed)} hard positions are more than the {expected} elements the domain holds")
     source = rng.integers(0, exemplar.count, len(placed))
+    cut: list[Cut] = []
     for centre in _places(domain, radius, placed):
-        patch, elements = _patch(start, box, toroidal, centre, radius, rng, placed, domain, turn, spacing)
+        patch, elements, taken = _patch(start, box, toroidal, centre, radius, rng, placed, domain, turn, spacing, cut)
+        cut.append(taken)
         good = domain.distance(patch) > 0 if len(patch) else np.zeros(0, bool)
+        patch = domain.wrapped(patch)
         if allowed is not None and len(patch):
             good &= (allowed(patch) & (1 << (exemplar.kind[elements] % 31))) > 0
         patch, elements = patch[good], elements[good]
         if len(placed) and len(patch):
-            far = cKDTree(placed).query(patch)[0] > CLOSE * spacing
+            far = _tree(domain, placed).query(_unit(domain, patch))[0] > CLOSE * spacing
             patch, elements = patch[far], elements[far]
         placed, source = np.vstack([placed, patch]), np.concatenate([source, elements])
     placed, source = _counted(placed, source, expected, 0 if pins is None else len(pins), domain, exemplar, allowed,
@@ -89,34 +96,57 @@ def _places(domain: Domain, radius: float, pins: np.ndarray) -> np.ndarray:
     return centres[np.lexsort((np.arange(len(centres)), distance, ~pinned))]
 
 
+def _unit(domain: Domain, points: np.ndarray) -> np.ndarray:
+    """Points from the domain's lower corner on, in its one unit where it repeats: as SciPy's trees take them."""
+    return wrapped(points - (domain.origin - domain.cell / 2), domain.period)
+
+
+def _tree(domain: Domain, points: np.ndarray) -> cKDTree:
+    return cKDTree(_unit(domain, points), boxsize=domain.period)
+
+
+Cut = tuple[np.ndarray, np.ndarray]
+"""Where a patch was put, and the place in the exemplar that it was cut from."""
+
+
 def _patch(start: np.ndarray, box: np.ndarray, toroidal: bool, centre: np.ndarray, radius: float,
            rng: np.random.Generator, placed: np.ndarray, domain: Domain,
-           turn: Callable[[np.ndarray], np.ndarray] | None, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of TRIES patches of the exemplar that which fits best at `centre`: least crowded against what is placed, and
-    with the fewest elements out of the domain. Positions (K, D), and which elements they are."""
+           turn: Callable[[np.ndarray], np.ndarray] | None, spacing: float, cut: list[Cut],
+           ) -> tuple[np.ndarray, np.ndarray, Cut]:
+    """The patch of the exemplar that fits best at `centre`: least crowded against what is placed, and with the fewest
+    elements out of the domain. Of TRIES at random, and of those that go on where the nearest patches before it end,
+    which are taken where chance fits worse by CONTINUE. Positions (K, D), which elements they are, and its cut."""
     frame = np.eye(len(centre)) if turn is None else turn(centre[None])[0].astype(np.float64)
-    tree = cKDTree(placed) if len(placed) else None
+    tree = _tree(domain, placed) if len(placed) else None
     period = box[1] - box[0]
-    best, least = (np.zeros((0, len(centre))), np.zeros(0, int)), np.inf
-    for _ in range(TRIES):
-        middle = rng.uniform(box[0], box[1]) if toroidal or (period <= 2 * radius).any() else rng.uniform(
-            box[0] + radius, box[1] - radius)
-        away = start - middle
-        if toroidal:
-            away -= period * np.rint(away / period)
-        away = away @ frame.T
+    inner = np.minimum(radius, period / 2)
+    tries = [(rng.uniform(box[0], box[1]) if toroidal else rng.uniform(box[0] + inner, box[1] - inner), 0.0)
+             for _ in range(TRIES)]
+    nearest = sorted(cut, key=lambda c: float(np.sum((c[0] - centre) ** 2)))[:GO_ON]
+    going_on = [middle + frame.T @ (centre - other) for other, middle in nearest]
+    tries += [(middle, CONTINUE) for middle in going_on
+              if toroidal or ((middle > box[0]) & (middle < box[1])).all()]
+    best, least = (np.zeros((0, len(centre))), np.zeros(0, int), (centre, tries[0][0])), np.inf
+    # a patch may be wider than the exemplar: it then holds elements more than once
+    steps = np.stack(np.meshgrid(*[(-1, 0, 1)] * len(centre), indexing="ij"), axis=-1).reshape(-1, len(centre))
+    copies = (start + period * steps[:, None]).reshape(-1, len(centre)) if toroidal else start
+    for middle, misfit in tries:
+        at = box[0] + np.mod(middle - box[0], period) if toroidal else middle
+        away = (copies - at) @ frame.T
         inside = (np.abs(away) <= radius).all(axis=1)
         patch = centre + away[inside]
-        misfit = 0.0
         if len(patch):
-            misfit += float((domain.distance(patch) < 0).mean())
-            if tree is not None:
-                distance = tree.query(patch)[0]
-                misfit += float(np.sum(np.maximum(0, 1 - distance / spacing) ** 2)) / len(patch) * 2
+            out = domain.distance(patch) < 0
+            if not toroidal:  # an exemplar that ends has borders to put on the domain's
+                misfit += float(out.mean())
+            if tree is not None and not out.all():
+                distance = tree.query(_unit(domain, patch[~out]))[0]
+                crowded = np.where(distance < SAME * spacing, 0.0, np.maximum(0, 1 - distance / spacing))
+                misfit += float(np.sum(crowded**2)) / len(patch) * 2
         else:
-            misfit = 10.0
+            misfit += 10.0
         if misfit < least:
-            least, best = misfit, (patch, np.nonzero(inside)[0])
+            least, best = misfit, (patch, np.nonzero(inside)[0] % len(start), (centre, middle))
     return best
 
 
@@ -125,7 +155,7 @@ def _counted(placed: np.ndarray, source: np.ndarray, expected: int, held: int, d
              ) -> tuple[np.ndarray, np.ndarray]:
     """Exactly `expected` elements: the most crowded go, and the widest gaps are filled. The first `held` stay."""
     while len(placed) > expected:
-        distance, index = cKDTree(placed).query(placed, k=2)
+        distance, index = _tree(domain, placed).query(_unit(domain, placed), k=2)
         crowd = np.where(np.arange(len(placed)) >= held, distance[:, 1], np.inf)
         # several at once, of which no two crowd each other
         going: list[int] = []
@@ -141,7 +171,7 @@ def _counted(placed: np.ndarray, source: np.ndarray, expected: int, held: int, d
         tries = tries[domain.distance(tries) > 0]
         if not len(tries):
             continue
-        best = tries[np.argmax(cKDTree(placed).query(tries)[0])] if len(placed) else tries[0]
+        best = tries[np.argmax(_tree(domain, placed).query(_unit(domain, tries))[0])] if len(placed) else tries[0]
         kinds = np.arange(exemplar.count)
         if allowed is not None:
             fitting = (allowed(best[None])[0] & (1 << (exemplar.kind % 31))) > 0
@@ -230,15 +260,15 @@ def on_coarse(exemplar: Elements, coarse: np.ndarray, frames_in: np.ndarray, fra
     for n in rng.permutation(count):
         if source[n] >= 0:
             continue
-        first, frame = int(rng.integers(exemplar.count)), int(rng.integers(max(latest, exemplar.frames // 2)))
-        source[n], begin[n] = first, frame
+        first, then = int(rng.integers(exemplar.count)), int(rng.integers(max(latest, exemplar.frames // 2)))
+        source[n], begin[n] = first, then
         taken = {first}
         for m in np.ravel(tree.query(middle[n], k=min(neighbours, count))[1]).tolist():
             if source[m] >= 0 or len(taken) == exemplar.count:
                 continue
             apart = np.linalg.norm(own - (own[first] + middle[m] - middle[n]), axis=1)
             apart[list(taken)] = np.inf
-            source[m], begin[m] = int(np.argmin(apart)), frame
+            source[m], begin[m] = int(np.argmin(apart)), then
             taken.add(int(source[m]))
     element, frame = tracks(exemplar, source, total, begin)
     q = np.einsum("nji,nj->ni", frames_in, (exemplar.positions - exemplar.coarse).reshape(-1, 3)).reshape(
