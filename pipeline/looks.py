@@ -29,7 +29,8 @@ def mesh_of(scene: ElementsScene, elements: Elements, frame: int) -> Mesh:
         case "beads":
             typical = float(np.median(elements.size))
             radius = elements.size / typical * scene.render.radius * scene.elements.spacing
-            return mesh.solids(_in_domain(scene, elements.positions[frame, :, 0]), radius, _bead_colours(scene, elements))
+            return mesh.solids(_in_domain(scene, elements.positions[frame, :, 0]), radius,
+                               _bead_colours(scene, elements))
         case "shoal":
             gait = mesh.swimming(swum(scene, elements), elements.size, elements.rate, scene.seed)
             return mesh.fish(elements.positions[frame, :, 0], gait.heading[frame], elements.size, elements.colour,
