@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from synth.elements.orientation import along_threads
 from synth.elements.samples import Elements
 
 SHARE = 0.25  # of the frames, and of the samples along an element, on each side of the filter's centre
@@ -40,3 +41,18 @@ def with_coarse(elements: Elements) -> Elements:
     longest = max(elements.grid) if elements.grid else 1
     return replace(elements, coarse=coarse(elements.positions, elements.grid, round(SHARE * elements.frames),
                                            max(1, round(SHARE * longest))))
+
+
+def following(threads: Elements, frames: int, along: int) -> Elements:
+    """A bundle whose C follows what its threads do together, so that their details hold only what is each one's own.
+
+    threads   with a C whose first samples say how they lie beside each other in the bundle's section, x and y
+    frames, along   reach of the filter on the mean thread, as for `coarse`
+    """
+    if threads.coarse is None or threads.topology != "thread":
+        raise ValueError("only threads that lie beside each other in a bundle have a motion that they share")
+    middle = coarse(threads.positions.mean(axis=1, keepdims=True), threads.grid, frames, along).astype(np.float64)
+    beside = threads.coarse[0, :, 0] - threads.coarse[0, :, 0].mean(axis=0)
+    turn = along_threads(middle).reshape(*middle.shape[:1], *threads.grid, 3, 3)
+    shared = middle + np.einsum("tsij,ej->tesi", turn, beside.astype(np.float64))
+    return replace(threads, coarse=shared)

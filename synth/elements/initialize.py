@@ -240,36 +240,49 @@ def tracks(exemplar: Elements, source: np.ndarray, frames: int, begin: np.ndarra
     return element, frame
 
 
+def _section(coarse: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """How elements lie beside each other in the first frame, by their first samples, in the local frame there (E, 3)."""
+    first = coarse[0, :, 0].astype(np.float64)
+    return (first - first.mean(axis=0)) @ frames[0].astype(np.float64)
+
+
+def _side_by_side(own: np.ndarray, middle: np.ndarray, neighbours: int, rng: np.random.Generator) -> np.ndarray:
+    """Which exemplar element, of middles `own`, each output element, of middles `middle`, is copied from (E,)."""
+    source, tree = np.full(len(middle), -1), cKDTree(middle)
+    for n in rng.permutation(len(middle)):
+        if source[n] >= 0:
+            continue
+        first = int(rng.integers(len(own)))
+        source[n], taken = first, [first]
+        for m in np.ravel(tree.query(middle[n], k=min(neighbours, len(middle)))[1]).tolist():
+            if source[m] >= 0 or len(taken) == len(own):
+                continue
+            apart = np.linalg.norm(own - (own[first] + middle[m] - middle[n]), axis=1)
+            apart[taken] = np.inf
+            source[m] = int(np.argmin(apart))
+            taken.append(int(source[m]))
+    return source
+
+
 def on_coarse(exemplar: Elements, coarse: np.ndarray, frames_in: np.ndarray, frames_out: np.ndarray, neighbours: int,
               seed: int, rate: float) -> Copied:
     """Threads or sheets on given coarse positions: each takes the details of a whole element of the exemplar.
 
     coarse      (T, E, S, 3): C of the output
     frames_in   local frames of the exemplar's samples (T·E·S, 3, 3), frames_out of the output's
-    neighbours  how many elements are copied from one patch: output elements side by side take exemplar elements side
-                by side, from the same frame on
+    neighbours  how many elements are copied as one patch: those side by side take exemplar elements side by side, and
+                all patches begin in the same frame, so that what lies side by side moves together. 1: each element by
+                itself, from a frame of its own
     """
     rng = np.random.Generator(np.random.Philox(key=seed))
     total, count, samples = coarse.shape[:3]
     assert exemplar.coarse is not None
-    middle = coarse[0].mean(axis=1)
-    own = exemplar.coarse[0].mean(axis=1)
-    source, begin = np.full(count, -1), np.zeros(count, int)
-    tree = cKDTree(middle)
-    latest = max(1, exemplar.frames - min(total, exemplar.frames) + 1)
-    for n in rng.permutation(count):
-        if source[n] >= 0:
-            continue
-        first, then = int(rng.integers(exemplar.count)), int(rng.integers(max(latest, exemplar.frames // 2)))
-        source[n], begin[n] = first, then
-        taken = {first}
-        for m in np.ravel(tree.query(middle[n], k=min(neighbours, count))[1]).tolist():
-            if source[m] >= 0 or len(taken) == exemplar.count:
-                continue
-            apart = np.linalg.norm(own - (own[first] + middle[m] - middle[n]), axis=1)
-            apart[list(taken)] = np.inf
-            source[m], begin[m] = int(np.argmin(apart)), then
-            taken.add(int(source[m]))
+    latest = max(1, exemplar.frames - total + 1, exemplar.frames // 2 if neighbours == 1 else 1)
+    if neighbours == 1:
+        source, begin = rng.integers(0, exemplar.count, count), rng.integers(0, latest, count)
+    else:
+        source = _side_by_side(_section(exemplar.coarse, frames_in), _section(coarse, frames_out), neighbours, rng)
+        begin = np.full(count, int(rng.integers(latest)))
     element, frame = tracks(exemplar, source, total, begin)
     q = np.einsum("nji,nj->ni", frames_in, (exemplar.positions - exemplar.coarse).reshape(-1, 3)).reshape(
         exemplar.positions.shape)
