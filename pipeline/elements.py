@@ -23,6 +23,7 @@ from synth.elements.samples import Elements
 from synth.field import domain_origin
 
 MANY = 200  # threads or sheets, where the scene does not say how many
+FOLLOWED = 0.2  # of its frames and samples, to each side: what a bundle does more slowly than that is not detail
 LIFT = 2.5  # seconds that a lift takes at least
 NEIGHBOURS = 9  # threads that are copied side by side
 
@@ -284,15 +285,15 @@ def _pins(scene: ElementsScene, positions: np.ndarray) -> Any:
 
 def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[Any, Any, Any]:
     """The exemplar for the search, the first guess and the guides of threads or sheets on coarse positions."""
-    from synth.elements import initialize, orientation, search
+    from synth.elements import decomposition, initialize, orientation, search
     from synth.elements.constraints import Constraints
     from synth.elements.synthesis import Guides
 
     if example.coarse is None:
-        from synth.elements import decomposition
-
         example = decomposition.with_coarse(example)
     assert example.coarse is not None
+    if example.topology == "thread":
+        example = decomposition.following(example, round(FOLLOWED * example.frames), round(FOLLOWED * example.grid[0]))
     coarse = stock.read("coarse").positions
 
     def frames_of(positions: np.ndarray) -> np.ndarray:
@@ -300,6 +301,7 @@ def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
             return orientation.along_threads(positions)
         return orientation.on_sheets(positions, example.grid)
 
+    assert example.coarse is not None
     inner, outer = frames_of(example.coarse), frames_of(coarse)
     within = search.exemplar(example, _shape(scene, scene.elements.spacing), inner)
     neighbours = NEIGHBOURS if example.topology == "thread" else 1

@@ -241,7 +241,7 @@ def tracks(exemplar: Elements, source: np.ndarray, frames: int, begin: np.ndarra
 
 
 def _section(coarse: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """How elements lie beside each other in the first frame, by their first samples, in the local frame there (E, 3)."""
+    """How elements lie beside each other (E, 3): their first samples in the first frame, in the local frame there."""
     first = coarse[0, :, 0].astype(np.float64)
     return (first - first.mean(axis=0)) @ frames[0].astype(np.float64)
 

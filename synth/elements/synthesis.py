@@ -185,9 +185,12 @@ class Optimizer:
     def correct(self, active: np.ndarray) -> None:
         """The extra solver step, and the hard constraints."""
         dims = self.positions.shape[3]
+        threads = self.elements.topology == "thread"
+        if self.settings.hybrid and threads:
+            self.positions[active] = collision.parted(self.positions[active], self.elements.size, self.elements.grid)
         for t in active:
             points = self.positions[t].reshape(-1, dims)
-            if self.settings.hybrid:
+            if self.settings.hybrid and not threads:
                 points = collision.resolved(points, self.radius, self.element, self.guides.period)
             self.positions[t] = self.guides.constraints.enforced(points).reshape(self.positions[t].shape)
         self.positions.reshape(-1, dims)[self._pinned()] = (
