@@ -48,8 +48,9 @@ def _exemplar(scene: ElementsScene) -> Elements:
         case "dots":
             return arrangement.drawn(pictures.read_foreign(wanted.file, "exemplar.file")[::-1])
         case "shoal":
-            made = {"homogeneous": school.homogeneous, "crossing": school.crossing, "mixed": school.mixed}
-            return made[wanted.behaviour](wanted.count, frames=wanted.frames, rate=scene.fps, seed=scene.seed)[0]
+            shoals: dict[str, Any] = {
+                "homogeneous": school.homogeneous, "crossing": school.crossing, "mixed": school.mixed}
+            return shoals[wanted.behaviour](wanted.count, frames=wanted.frames, rate=scene.fps, seed=scene.seed)[0]
         case "noodles":
             threads: dict[str, Any] = {"simulated": simulation.noodles, "jagged": handmade.jagged}
             return threads[wanted.style](frames=wanted.frames, rate=scene.fps, seed=scene.seed)

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from synth.elements.neighborhood import wrapped
 from synth.elements.search import difference
 
-ROUNDS = 8  # of pushing apart, at most
+ROUNDS = 20  # of pushing apart, at most
 THREAD_ROUNDS = 16
 BETWEEN = 5  # balls of a thread from one sample to the next
 CALM = 1.0  # frames

@@ -279,16 +279,17 @@ def on_coarse(exemplar: Elements, coarse: np.ndarray, frames_in: np.ndarray, fra
     assert exemplar.coarse is not None
     latest = max(1, exemplar.frames - total + 1, exemplar.frames // 2 if neighbours == 1 else 1)
     if neighbours == 1:
-        source, begin = rng.integers(0, exemplar.count, count), rng.integers(0, latest, count)
+        source = rng.integers(0, exemplar.count, (count,))
+        begin = rng.integers(0, latest, (count,))
     else:
         source = _side_by_side(_section(exemplar.coarse, frames_in), _section(coarse, frames_out), neighbours, rng)
-        begin = np.full(count, int(rng.integers(latest)))
-    element, frame = tracks(exemplar, source, total, begin)
+        begin = np.full(count, rng.integers(latest))
+    element, at = tracks(exemplar, source, total, begin)
     q = np.einsum("nji,nj->ni", frames_in, (exemplar.positions - exemplar.coarse).reshape(-1, 3)).reshape(
         exemplar.positions.shape)
-    details = q[frame, element]
+    details = q[at, element]
     positions = coarse + np.einsum("nij,nj->ni", frames_out, details.reshape(-1, 3)).reshape(coarse.shape)
-    first_sample = (frame * exemplar.count + element)[..., None] * samples
+    first_sample = (at * exemplar.count + element)[..., None] * samples
     return Copied(
         Elements(positions, exemplar.grid, rate, exemplar.size[source], exemplar.kind[source],
                  exemplar.colour[source], coarse), (first_sample + np.arange(samples)).ravel().astype(np.int32))
