@@ -110,7 +110,8 @@ def _settings(scene: ElementsScene) -> Any:
 
     wanted = scene.synthesis
     return Settings(iterations=wanted.iterations, n=wanted.matches, coherent=wanted.search == "k-coherence",
-                    solver=wanted.assignment, centre=wanted.hold, hybrid=wanted.hybrid)
+                    solver=wanted.assignment, centre=wanted.hold, hybrid=wanted.hybrid,
+                    control=scene.elements.control.weight * scene.elements.spacing**2 if scene.elements.control else 0)
 
 
 def _shape(scene: ElementsScene, spacing: float) -> Any:
@@ -132,7 +133,10 @@ def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
     wanted = scene.elements
     if example.dimensions != scene.dimension:
         raise ValueError(f"the exemplar has {example.dimensions} dimensions, the domain {scene.dimension}")
-    within = search.exemplar(example, _shape(scene, wanted.spacing), period=_period(example))
+    control = _control(scene)
+    ranks = _ranked(example, wanted.control.property) if wanted.control else np.zeros(example.count)
+    within = search.exemplar(example, _shape(scene, wanted.spacing), period=_period(example),
+                             control=ranks)
     region = domain(scene, stock)
     flow, turn, allowed = _flow(scene, stock, region), _turn(scene, stock), _allowed(scene)
     pins = [pin for pin in wanted.pins if pin.frame == 1]
@@ -141,13 +145,16 @@ def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
         example, region, scene.frames if together else 1, within.shape.radius, wanted.spacing, scene.seed,
         turn=None if turn is None else lambda points: turn(0, points),
         pins=np.array([pin.at for pin in pins]) if pins else None,
-        allowed=None if allowed is None else lambda points: allowed(0, points), count=wanted.count or None)
+        allowed=None if allowed is None else lambda points: allowed(0, points),
+        unlike=None if control is None else lambda points, elements: (
+            control(0, points) - ranks[elements]) ** 2,
+        count=wanted.count or None)
     if together and flow is not None:
         start = initialize.carried(start, flow)
     margin = 0.5 * wanted.spacing if scene.obstacles or wanted.domain else 0.0
     return within, start, Guides(
         Constraints(region, margin, _pins(scene, start.elements.positions), hard=margin > 0), flow, turn,
-        allowed=allowed, period=_toroidal(scene))
+        control=control, allowed=allowed, period=_toroidal(scene))
 
 
 def _toroidal(scene: ElementsScene) -> np.ndarray | None:
@@ -240,23 +247,42 @@ def _turn(scene: ElementsScene, stock: Stock) -> Any:
     return circling
 
 
+def _ranked(example: Elements, name: str) -> np.ndarray:
+    """The elements' property (E,) from 0, the least, to 1."""
+    values = np.asarray(getattr(example, name), np.float64)
+    return (values - values.min()) / max(float(np.ptp(values)), 1e-9)
+
+
+def _control(scene: ElementsScene) -> Any:
+    """The control map at points of the domain, 0 to 1; None without one."""
+    if scene.elements.control is None:
+        return None
+    tones = pictures.read_grey(scene.elements.control.file, "elements.control.file")
+    return lambda t, points: _map_at(scene, tones, points, 1)
+
+
+def _map_at(scene: ElementsScene, values: np.ndarray, points: np.ndarray, order: int) -> np.ndarray:
+    """A picture that fills the domain, lowest row first, at points (M, D)."""
+    from scipy import ndimage
+
+    rows, columns = values.shape
+    width = scene.cells[0] / scene.cells[1]
+    at = [points[:, 1] * rows - 0.5, (points[:, 0] / width + 0.5) * columns - 0.5]
+    return ndimage.map_coordinates(values, at, order=order, mode="nearest")
+
+
 def _allowed(scene: ElementsScene) -> Any:
     """Which kinds may stand where, as bits; None where all may everywhere."""
     if not scene.elements.selections:
         return None
-    from scipy import ndimage
-
-    maps = [pictures.read_grey(s.file, f"elements.selections[{n}].file")[::-1] > 0.5
+    maps = [pictures.read_grey(s.file, f"elements.selections[{n}].file") > 0.5
             for n, s in enumerate(scene.elements.selections)]
     bits = [sum(1 << kind for kind in s.kinds) for s in scene.elements.selections]
-    width = scene.cells[0] / scene.cells[1]
 
     def allowed(t: int, points: np.ndarray) -> np.ndarray:
         found = np.zeros(len(points), np.int64)
         for bright, kinds in zip(maps, bits, strict=True):
-            rows, columns = bright.shape
-            at = [points[:, 1] * rows - 0.5, (points[:, 0] / width + 0.5) * columns - 0.5]
-            inside = ndimage.map_coordinates(bright.astype(np.uint8), at, order=0, mode="nearest") > 0
+            inside = _map_at(scene, bright.astype(np.uint8), points, 0) > 0
             found |= np.where(inside, kinds, 0)
         others = (1 << 31) - 1
         for kinds in bits:

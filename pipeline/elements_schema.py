@@ -116,6 +116,14 @@ class Selection(Table):
     file: Asset = key("a picture that fills the domain: these kinds stand where it is bright, no other does")
 
 
+class Control(Table):
+    """A control map (§4.1, [Lu et al. 2007]): where which elements of the exemplar should rather stand."""
+
+    file: Asset = key("a picture that fills the domain, black to white")
+    property: Literal["size", "kind"] = key("of the exemplar's elements, least to largest, that follows it", "size")
+    weight: float = key("of its difference in the search", 1.0, "squared spacings", ge=0, le=1000)
+
+
 class Elements(Table):
     """The output. Heights are those of the domain, which is 1 high, its floor at y = 0, centred on x = 0 and z = 0."""
 
@@ -133,6 +141,7 @@ class Elements(Table):
         "hard positions, an array of tables [[elements.pins]]", (), max_length=1000)
     selections: Annotated[tuple[Selection, ...], Strict(False)] = key(
         "an array of tables [[elements.selections]]", (), max_length=16)
+    control: Control | None = key("a control map; none: all elements stand everywhere alike", None)
 
 
 class Synthesis(Table):

@@ -431,6 +431,8 @@ def _element_places(scene: ElementsScene) -> Faults:
             yield f"elements.pins[{number}].frame", f"the animation has {scene.frames} frames"
     if synthesis.sequence == "frames" and synthesis.after:
         yield "synthesis.after", 'is 0 with sequence = "frames": later frames are not there yet (figure 3)'
+    if synthesis.sequence == "frames" and scene.coarse is not None and not scene.flows:
+        yield "synthesis.sequence", 'of threads and sheets is "together": their coarse motion is known for all frames'
     if wanted.along == "flow" and not scene.flows:
         yield "elements.along", '"flow" needs a [coarse] that is a field'
 

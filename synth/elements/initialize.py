@@ -37,13 +37,15 @@ class Copied:
 
 def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spacing: float, seed: int,
            turn: Callable[[np.ndarray], np.ndarray] | None = None, pins: np.ndarray | None = None,
-           allowed: Callable[[np.ndarray], np.ndarray] | None = None, count: int | None = None) -> Copied:
+           allowed: Callable[[np.ndarray], np.ndarray] | None = None,
+           unlike: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None, count: int | None = None) -> Copied:
     """Elements of one sample each, in a domain.
 
     radius    of the neighbourhood, the size of a patch; spacing: the exemplar's nearest distance, world units
     turn      local frames (M, D, D) at points (M, D) of the first frame
     pins      (P, D) hard positions in the first frame
     allowed   bits of the kinds that may stand at points (M, D)
+    unlike    how little exemplar elements (M,) suit points (M, D), from 0 to 1: a control map's difference
     count     of the elements; None: as dense as the exemplar
     Raises ValueError for a domain smaller than a neighbourhood, or more pins than elements.
     """
@@ -63,7 +65,8 @@ def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spaci
     source = rng.integers(0, exemplar.count, len(placed))
     cut: list[Cut] = []
     for centre in _places(domain, radius, placed):
-        patch, elements, taken = _patch(start, box, toroidal, centre, radius, rng, placed, domain, turn, spacing, cut)
+        patch, elements, taken = _patch(start, box, toroidal, centre, radius, rng, placed, domain, turn, spacing, cut,
+                                        unlike)
         cut.append(taken)
         good = domain.distance(patch) > 0 if len(patch) else np.zeros(0, bool)
         patch = domain.wrapped(patch)
@@ -112,7 +115,7 @@ Cut = tuple[np.ndarray, np.ndarray]
 def _patch(start: np.ndarray, box: np.ndarray, toroidal: bool, centre: np.ndarray, radius: float,
            rng: np.random.Generator, placed: np.ndarray, domain: Domain,
            turn: Callable[[np.ndarray], np.ndarray] | None, spacing: float, cut: list[Cut],
-           ) -> tuple[np.ndarray, np.ndarray, Cut]:
+           unlike: Callable[[np.ndarray, np.ndarray], np.ndarray] | None) -> tuple[np.ndarray, np.ndarray, Cut]:
     """The patch of the exemplar that fits best at `centre`: least crowded against what is placed, and with the fewest
     elements out of the domain. Of TRIES at random, and of those that go on where the nearest patches before it end,
     which are taken where chance fits worse by CONTINUE. Positions (K, D), which elements they are, and its cut."""
@@ -137,6 +140,8 @@ def _patch(start: np.ndarray, box: np.ndarray, toroidal: bool, centre: np.ndarra
         patch = centre + away[inside]
         if len(patch):
             out = domain.distance(patch) < 0
+            if unlike is not None:
+                misfit += float(unlike(patch, np.nonzero(inside)[0] % len(start)).mean())
             if not toroidal:  # an exemplar that ends has borders to put on the domain's
                 misfit += float(out.mean())
             if tree is not None and not out.all():
