@@ -121,7 +121,9 @@ def _shape(scene: ElementsScene, spacing: float) -> Any:
     radius = wanted.neighborhood * spacing
     # Table 2: σ_p is measured by the neighbourhood; Eq. 10 divides squares of distances by it
     sigma = wanted.sigma_p * radius**2 if wanted.sigma_p else np.inf
-    return Shape(radius, wanted.before, wanted.after, wanted.whole, sigma=sigma)
+    # sheets are compared by their own samples alone (§3.2)
+    most = {"most": 1} if scene.exemplar.kind == "papers" else {}
+    return Shape(radius, wanted.before, wanted.after, wanted.whole, sigma=sigma, **most)
 
 
 def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[Any, Any, Any]:

@@ -28,7 +28,7 @@ LABELS = {
     "detail-divergence": "divergence of *H′*", "combined": "*F* = *L* + *ωH′*",
     "combined-colour": "*F* = *L* + *ωH′*", "result": "result",
 }
-INSET = 0.3  # of a panel's width
+INSET = 0.27  # of a panel's width
 METHODS = ("render.layout", "render.film", "render.lic")
 
 
