@@ -31,7 +31,11 @@ NEIGHBOURS = 9  # threads that are copied side by side
 def make_exemplar(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
     """I, by procedure or from a file, scaled so that its spacing is elements.spacing."""
     example = _exemplar(scene)
-    yield 0, _scaled(example, scene.elements.spacing / _spacing(example))
+    example = _scaled(example, scene.elements.spacing / _spacing(example))
+    if scene.render.kind == "beads":
+        radius = scene.elements.radius * scene.elements.spacing
+        example = replace(example, size=example.size * np.float32(radius / np.median(example.size)))
+    yield 0, example
 
 
 def _exemplar(scene: ElementsScene) -> Elements:
@@ -414,7 +418,7 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
     solid = obstacles.inputs(scene)
     example = Product(
         name="exemplar", stage="synth", folder="fields", suffix=_npz, animated=False,
-        reads=("exemplar", "elements.spacing", "seed", "fps"), inputs=(),
+        reads=("exemplar", "elements.spacing", "elements.radius", "render.kind", "seed", "fps"), inputs=(),
         methods=("synth.elements.arrangement", "synth.elements.school", "synth.elements.simulation",
                  "synth.elements.handmade"), make=make_exemplar, write=write_tracks, read=read_tracks)
     made = [example]

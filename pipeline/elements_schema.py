@@ -130,6 +130,8 @@ class Elements(Table):
     size: Grid = grid("columns and rows of the grid on which domain, obstacles and flow are known", (256, 256))
     spacing: float = key("nearest distance of elements, of sheets that of their samples: to it the exemplar is scaled",
                          0.03, "heights", gt=0, le=1)
+    radius: float = key("of a particle of the exemplar's middle size, as drawn and as it collides", 0.42, "spacings",
+                        gt=0, le=10)
     count: int = key("of elements; 0: as dense as the exemplar, of threads and sheets 200", 0, ge=0, le=100000)
     domain: Annotated[Obstacle, Field(discriminator="kind")] | None = key(
         "a table with the keys of one of [[obstacles]]: elements stay inside; none: the whole domain", None)
@@ -168,7 +170,6 @@ class BeadsRender(Table):
     kind: Literal["beads"] = key("beads on paper")
     width: int = key("of the picture", 800, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
-    radius: float = key("of a bead of the exemplar's commonest size", 0.42, "spacings", gt=0, le=10)
     colour: Literal["exemplar", "origin"] = key(
         "of a bead: that of what it was copied from, or by where it is in the first frame, which shows its way",
         "exemplar")

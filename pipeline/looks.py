@@ -27,9 +27,7 @@ def mesh_of(scene: ElementsScene, elements: Elements, frame: int) -> Mesh:
 
     match scene.render.kind:
         case "beads":
-            typical = float(np.median(elements.size))
-            radius = elements.size / typical * scene.render.radius * scene.elements.spacing
-            return mesh.solids(_in_domain(scene, elements.positions[frame, :, 0]), radius,
+            return mesh.solids(_in_domain(scene, elements.positions[frame, :, 0]), elements.size,
                                _bead_colours(scene, elements))
         case "shoal":
             gait = mesh.swimming(swum(scene, elements), elements.size, elements.rate, scene.seed)
@@ -218,7 +216,7 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
     """The meshes, the USD file, and the pictures that the figure shows."""
     solid = obstacles.inputs(scene)
     shape = ("synth.elements.mesh",)
-    mesh_keys = ("render.kind", "render.radius", "render.colour", "render.speed", "elements.spacing", "seed")
+    mesh_keys = ("render.kind", "render.colour", "render.speed", "elements.spacing", "seed")
     ground = ("elements.domain", "elements.size", "elements.toroidal")
     made = [
         Product(name="mesh", stage="bake", folder="geometry", suffix=lambda s: "ply", reads=mesh_keys,
