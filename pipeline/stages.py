@@ -161,17 +161,20 @@ class Works:
     def _in_order(self, stage: str) -> list[str]:
         """The names of a stage's products in all variants, each after those that it is made from in any."""
         names: list[str] = []
+        inputs: dict[str, dict[str, None]] = {}
+        for products in self.products.values():
+            for product in products.values():
+                inputs.setdefault(product.name, {}).update(dict.fromkeys(other for other, _ in product.inputs))
 
-        def place(products: dict[str, Product], name: str) -> None:
-            for other, _ in products[name].inputs:
-                place(products, other)
-            if name not in names and products[name].stage == stage:
+        def place(name: str) -> None:
+            for other in inputs[name]:
+                place(other)
+            if name not in names and any(
+                    name in products and products[name].stage == stage for products in self.products.values()):
                 names.append(name)
 
-        # first those with most inputs: a product that another variant makes of less must not come too early
-        for products in sorted(self.products.values(), key=len, reverse=True):
-            for name in products:
-                place(products, name)
+        for name in inputs:
+            place(name)
         return names
 
     def _check_foreign_files(self, names: Iterable[str]) -> None:
