@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from pipeline import fields, looks, obstacles
-from pipeline.elements_schema import ElementsScene
+from pipeline.elements_schema import ElementsScene, TracksExemplar, TracksMotion
+from pipeline.errors import WrongValue, blaming
 from pipeline.files import atomic, pictures, tracks
 from pipeline.product import Frames, Product, Stock
 from synth.elements.samples import Elements
@@ -26,12 +27,21 @@ MANY = 200  # threads or sheets, where the scene does not say how many
 FOLLOWED = 0.2  # of its frames and samples, to each side: what a bundle does more slowly than that is not detail
 LIFT = 2.5  # seconds that a lift takes at least
 NEIGHBOURS = 9  # threads that are copied side by side
+TOPOLOGIES = {"beads": "none", "shoal": "none", "noodles": "thread", "papers": "sheet"}
+"""How the elements hang together that a [render] kind draws."""
+PLURALS = {"none": "points", "thread": "threads", "sheet": "sheets"}
+SIZES = {"none": 0.8, "thread": 0.38, "sheet": 0.02}
+"""Length of a fish, radius of a thread, thickness of a sheet whose file does not say it, spacings."""
+CROWDED = 0.6  # spacings: an output whose elements cannot be farther apart than that holds too many
 
 
 def make_exemplar(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
     """I, by procedure or from a file, scaled so that its spacing is elements.spacing."""
     example = _exemplar(scene)
-    example = _scaled(example, scene.elements.spacing / _spacing(example))
+    spacing = _spacing(example)
+    if not spacing > 0:
+        raise ValueError("its elements are all in one place")
+    example = _scaled(example, scene.elements.spacing / spacing)
     if scene.render.kind == "beads":
         radius = scene.elements.radius * scene.elements.spacing
         example = replace(example, size=example.size * np.float32(radius / np.median(example.size)))
@@ -56,14 +66,68 @@ def _exemplar(scene: ElementsScene) -> Elements:
                 "homogeneous": school.homogeneous, "crossing": school.crossing, "mixed": school.mixed}
             return shoals[wanted.behaviour](wanted.count, frames=wanted.frames, rate=scene.fps, seed=scene.seed)[0]
         case "noodles":
-            threads: dict[str, Any] = {"simulated": simulation.noodles, "jagged": handmade.jagged}
-            return threads[wanted.style](frames=wanted.frames, rate=scene.fps, seed=scene.seed)
+            threads: Any = simulation.noodles if wanted.style == "simulated" else handmade.jagged
+            return threads(frames=wanted.frames, rate=scene.fps, seed=scene.seed)
         case "papers":
             sheets: dict[str, Any] = {"simulated": simulation.sheets, "folded": handmade.folded,
-                      "fluttering": handmade.fluttering}
+                                      "fluttering": handmade.fluttering}
             return sheets[wanted.style](frames=wanted.frames, rate=scene.fps, seed=scene.seed)
-    return tracks.read_foreign(wanted.file, "exemplar.file", rate=wanted.rate or scene.fps,
-                               dimensions=scene.dimension)
+    with blaming("exemplar.file"):
+        return _from_tracks(scene, wanted)
+
+
+def _from_tracks(scene: ElementsScene, wanted: TracksExemplar) -> Elements:
+    """The elements of a file, of the topology and the dimensions of the scene, at its rate."""
+    drawn = scene.render.kind
+    found = tracks.read_foreign(
+        wanted.file, "exemplar.file", rate=wanted.rate, otherwise=scene.fps,
+        dimensions=2 if wanted.captured else scene.dimension, fewest_frames=1 if drawn == "beads" else 2)
+    if found.topology != TOPOLOGIES[drawn]:
+        raise WrongValue("render.kind", f'"{drawn}" draws {PLURALS[TOPOLOGIES[drawn]]}; the elements of '
+                                        f"{wanted.file.name} are {PLURALS[found.topology]}")
+    if wanted.captured:
+        from synth.elements import school
+
+        if found.dimensions == 3:
+            raise WrongValue("exemplar.captured", f"tracks of a film are x and y; {wanted.file.name} has depth")
+        # a film's y points down, as school.tracked takes it
+        found = school.tracked(found.positions[:, :, 0], found.rate)[0]
+    elif wanted.file.suffix.lower() != ".npz":
+        found = replace(found, size=np.full(found.count, SIZES[found.topology] * _spacing(found)))
+    return _at_rate(_in_space(found, scene.dimension if found.topology == "none" else 3), scene.fps)
+
+
+def _in_space(elements: Elements, dimensions: int) -> Elements:
+    """What is flat is at depth 0 in space; what is at one depth is flat in the plane."""
+    if elements.dimensions == dimensions:
+        return elements
+    if dimensions == 3:
+        deep = [(0, 0)] * 3 + [(0, 1)]
+        return replace(elements, positions=np.pad(elements.positions, deep), box=None,
+                       coarse=None if elements.coarse is None else np.pad(elements.coarse, deep))
+    if np.ptp(elements.positions[..., 2]) > 0:
+        raise ValueError("its elements are not in one plane, and elements.size is in 2-D")
+    return replace(elements, positions=elements.positions[..., :2], coarse=None,
+                   box=None if elements.box is None else elements.box[:, :2])
+
+
+def _at_rate(elements: Elements, rate: float) -> Elements:
+    """The same motion at `rate` frames per second, between frames by cubic splines."""
+    if elements.rate == rate or elements.frames == 1:
+        return replace(elements, rate=rate)
+    from scipy.interpolate import make_interp_spline
+
+    frames = np.arange(0, elements.frames - 1 + 1e-9, elements.rate / rate)
+    if len(frames) < 2:
+        raise ValueError(f"{elements.frames} frames at {elements.rate:g} per second are one at the scene's {rate:g}")
+
+    def between(values: np.ndarray) -> np.ndarray:
+        spline = make_interp_spline(np.arange(elements.frames), values.astype(np.float64), min(3, elements.frames - 1))
+        found: np.ndarray = spline(frames)
+        return found
+
+    return replace(elements, rate=rate, positions=between(elements.positions),
+                   coarse=None if elements.coarse is None else between(elements.coarse))
 
 
 def _spacing(example: Elements) -> float:
@@ -74,7 +138,7 @@ def _spacing(example: Elements) -> float:
     if example.topology != "sheet":
         places = example.positions if example.coarse is None else example.coarse
         return neighborhood.spacing(places, _period(example))
-    surface = example.positions.reshape(*example.positions.shape[:2], *example.grid, 3)
+    surface = example.positions.reshape(*example.positions.shape[:2], *example.grid, example.dimensions)
     return float(np.linalg.norm(np.diff(surface, axis=3), axis=-1).mean())
 
 
@@ -101,11 +165,8 @@ def make_elements(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iter
         run = synthesis.together(within, start.elements, start.source, guides, settings, kept)
     else:
         run = synthesis.by_frames(within, start.elements, start.source, scene.frames, guides, settings, kept)
-    optimizer = None
     for optimizer in run:
         _keep(stock, optimizer.state())
-    if optimizer is None:  # the run was interrupted after its last iteration, before its file was whole
-        raise RuntimeError("nothing was left to do")
     yield 0, (optimizer.result(), np.array(optimizer.energies))
 
 
@@ -137,30 +198,50 @@ def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
     from synth.elements.synthesis import Guides
 
     wanted = scene.elements
-    if example.dimensions != scene.dimension:
-        raise ValueError(f"the exemplar has {example.dimensions} dimensions, the domain {scene.dimension}")
     control = _control(scene)
     ranks = _ranked(example, wanted.control.property) if wanted.control else np.zeros(example.count)
-    within = search.exemplar(example, _shape(scene, wanted.spacing), period=_period(example),
-                             control=ranks)
+    within = search.exemplar(example, _shape(scene, wanted.spacing), period=_period(example), control=ranks)
     region = domain(scene, stock)
-    flow, turn, allowed = _flow(scene, stock, region), _turn(scene, stock), _allowed(scene)
+    count = wanted.count or initialize.as_dense(example, region, wanted.spacing)
+    _require_room(scene, region, count)
+    flow, turn, allowed = _flow(scene, stock, region), _turn(scene, stock), _allowed(scene, example)
     pins = [pin for pin in wanted.pins if pin.frame == 1]
     together = scene.synthesis.sequence == "together"
-    start = initialize.points(
-        example, region, scene.frames if together else 1, within.shape.radius, wanted.spacing, scene.seed,
-        turn=None if turn is None else lambda points: turn(0, points),
-        pins=np.array([pin.at for pin in pins]) if pins else None,
-        allowed=None if allowed is None else lambda points: allowed(0, points),
-        unlike=None if control is None else lambda points, elements: (
-            control(0, points) - ranks[elements]) ** 2,
-        count=wanted.count or None)
+    with blaming("synthesis.neighborhood"):
+        start = initialize.points(
+            example, region, scene.frames if together else 1, within.shape.radius, wanted.spacing, scene.seed,
+            turn=None if turn is None else lambda points: turn(0, points),
+            pins=np.array([pin.at for pin in pins]) if pins else None,
+            allowed=None if allowed is None else lambda points: allowed(0, points),
+            unlike=None if control is None else lambda points, elements: (
+                control(0, points) - ranks[elements]) ** 2, count=count)
     if together and flow is not None:
         start = initialize.carried(start, flow)
     margin = 0.5 * wanted.spacing if scene.obstacles or wanted.domain else 0.0
     return within, start, Guides(
         Constraints(region, margin, _pins(scene, start.elements.positions), hard=margin > 0), flow, turn,
         control=control, allowed=allowed, period=_toroidal(scene))
+
+
+def _require_room(scene: ElementsScene, region: Any, count: int) -> None:
+    """Raise for an output that is over-constrained: more elements than the domain holds, more hard positions than
+    elements, or one that lies outside."""
+    room = float((region.inside > 0).sum()) * region.cell**scene.dimension
+    # of the densest packing, in the plane or in space
+    most = room / ((CROWDED * scene.elements.spacing) ** scene.dimension * (0.866 if scene.dimension == 2 else 0.707))
+    if count > most:
+        raise WrongValue("elements.count", f"{count:,} elements are more than the domain holds: "
+                                           f"{int(most):,} would be {CROWDED:g} spacings apart")
+    pinned: dict[int, int] = {}
+    for number, pin in enumerate(scene.elements.pins):
+        pinned[pin.frame] = pinned.get(pin.frame, 0) + 1
+        cells = (np.array(pin.at) - region.origin) / region.cell
+        beyond = (cells < -0.5) | (cells > np.array(scene.cells) - 0.5)  # the distance is not known there
+        if beyond.any() or region.distance(np.array([pin.at]))[0] < 0:
+            raise WrongValue(f"elements.pins[{number}].at", "is outside the domain, or in an obstacle")
+    frame = max(pinned, key=lambda f: pinned[f], default=0)
+    if frame and pinned[frame] > count:
+        raise WrongValue("elements.pins", f"{pinned[frame]} hard positions in frame {frame}, and {count} elements")
 
 
 def _toroidal(scene: ElementsScene) -> np.ndarray | None:
@@ -184,13 +265,19 @@ def domain(scene: ElementsScene, stock: Stock) -> Any:
         inside = np.minimum(inside, np.minimum(at, count * cell - at).reshape(
             [-1 if n == axis else 1 for n in range(scene.dimension)]))
     if scene.elements.domain is not None:
-        shape = obstacles.solid(scene, scene.elements.domain, "elements.domain").distance
-        inside = np.minimum(inside, -shape * cell)
+        inside = np.minimum(inside, -_shaped(scene) * cell)
     if scene.obstacles:
         inside = np.minimum(inside, stock.read("solid").values)
     if not (inside > 0).any():
-        raise ValueError("the domain is empty: obstacles fill it, or its shape lies outside")
+        raise WrongValue("obstacles" if scene.obstacles else "elements.domain", "leave elements no room"
+                         if scene.obstacles else "is smaller than a cell of elements.size")
     return Domain(inside.astype(np.float32), cell, origin, _toroidal(scene))
+
+
+def _shaped(scene: ElementsScene) -> np.ndarray:
+    """The signed distance to the border of the domain's shape, cells, negative inside."""
+    with blaming("elements.domain"):
+        return obstacles.solid(scene, scene.elements.domain, "elements.domain").distance
 
 
 def _flow(scene: ElementsScene, stock: Stock, region: Any) -> Any:
@@ -277,13 +364,24 @@ def _map_at(scene: ElementsScene, values: np.ndarray, points: np.ndarray, order:
     return ndimage.map_coordinates(values, at, order=order, mode="nearest")
 
 
-def _allowed(scene: ElementsScene) -> Any:
+def _maps(scene: ElementsScene) -> list[np.ndarray]:
+    """Where each selection is, bool, lowest row first."""
+    return [pictures.read_grey(s.file, f"elements.selections[{n}].file") > 0.5
+            for n, s in enumerate(scene.elements.selections)]
+
+
+def _allowed(scene: ElementsScene, example: Elements) -> Any:
     """Which kinds may stand where, as bits; None where all may everywhere."""
     if not scene.elements.selections:
         return None
-    maps = [pictures.read_grey(s.file, f"elements.selections[{n}].file") > 0.5
-            for n, s in enumerate(scene.elements.selections)]
-    bits = [sum(1 << kind for kind in s.kinds) for s in scene.elements.selections]
+    known = sorted(set(example.kind.tolist()))
+    for number, selection in enumerate(scene.elements.selections):
+        for kind in selection.kinds:
+            if kind not in known:
+                raise WrongValue(f"elements.selections[{number}].kinds", f"the exemplar has no element of kind {kind}; "
+                                                                         f"it has {', '.join(map(str, known))}")
+    maps = _maps(scene)
+    bits = [sum(1 << kind for kind in set(s.kinds)) for s in scene.elements.selections]
 
     def allowed(t: int, points: np.ndarray) -> np.ndarray:
         found = np.zeros(len(points), np.int64)
@@ -322,8 +420,7 @@ def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
     from synth.elements.constraints import Constraints
     from synth.elements.synthesis import Guides
 
-    if example.coarse is None:
-        example = decomposition.with_coarse(example)
+    example = _decomposed(example)
     assert example.coarse is not None
     if example.topology == "thread":
         example = decomposition.following(example, round(FOLLOWED * example.frames), round(FOLLOWED * example.grid[0]))
@@ -342,22 +439,36 @@ def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
     return within, start, Guides(Constraints(), frames=outer)
 
 
+def _decomposed(example: Elements) -> Elements:
+    """An exemplar with its C."""
+    if example.coarse is not None:
+        return example
+    from synth.elements import decomposition
+
+    return decomposition.with_coarse(example)
+
+
 def make_coarse(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
     """C of threads or sheets, as many as the output has."""
     from synth.elements import bundle, scraps, simulation
 
     wanted: Any = scene.coarse
-    example = stock.read("exemplar")
+    example = _decomposed(stock.read("exemplar"))
+    assert example.coarse is not None
     count = scene.elements.count or MANY
     if wanted.kind == "tracks":
-        foreign = tracks.read_foreign(wanted.file, "coarse.file", rate=scene.fps, fewest_elements=1)
+        foreign = _coarse_tracks(scene, wanted)
         if foreign.grid != example.grid:
-            raise ValueError(f"coarse.file has a grid {foreign.grid} for an element, the exemplar {example.grid}")
-        yield 0, foreign
+            raise WrongValue("coarse.file", f"{_sized(foreign.grid)} samples for an element, and {_sized(example.grid)}"
+                                            " in the exemplar")
+        yield 0, _looking_like(replace(foreign, size=np.full(foreign.count, np.median(example.size))), example)
         return
     spacing = scene.elements.spacing
     settings: dict[str, Any] = {"frames": scene.frames, "rate": scene.fps, "seed": scene.seed}
     if wanted.kind == "gust":
+        if example.grid[0] != example.grid[1]:
+            raise WrongValue("coarse.kind", f'"gust" tosses square sheets; those of the exemplar are '
+                                            f"{_sized(example.grid)}")
         yield 0, _scaled(scraps.tossed(count, side=example.grid[0], **settings), spacing)
         return
     thick = float(np.linalg.norm(bundle.section(count, 1.0), axis=1).max()) + 0.5
@@ -369,8 +480,43 @@ def make_coarse(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterat
     curve = curve[np.linspace(0, enough - 1, scene.frames).round().astype(int)]
     made = _scaled(bundle.duplicated(curve, count, radius=float(np.median(example.size)) / spacing, rate=scene.fps),
                    spacing)
-    alike = np.arange(count) % example.count
-    yield 0, replace(made, kind=example.kind[alike], colour=example.colour[alike])
+    yield 0, _looking_like(made, example)
+
+
+def _looking_like(made: Elements, example: Elements) -> Elements:
+    """Elements of the kinds and colours of the exemplar's, one after the other."""
+    alike = np.arange(made.count) % example.count
+    return replace(made, kind=example.kind[alike], colour=example.colour[alike])
+
+
+def _coarse_tracks(scene: ElementsScene, wanted: TracksMotion) -> Elements:
+    """C from a file, as long as the animation, in heights as it stands."""
+    found = tracks.read_foreign(wanted.file, "coarse.file", otherwise=scene.fps, dimensions=3, fewest_elements=1)
+    with blaming("coarse.file"):
+        if found.topology != TOPOLOGIES[scene.render.kind]:
+            raise ValueError(f"its elements are {PLURALS[found.topology]}")
+        found = _at_rate(_in_space(found, 3), scene.fps)
+        if found.frames < scene.frames:
+            raise ValueError(f"lasts {found.frames} frames, and the animation {scene.frames}")
+    return replace(found, positions=found.positions[: scene.frames], coarse=None)
+
+
+def _sized(grid: tuple[int, ...]) -> str:
+    return " × ".join(map(str, grid))
+
+
+def check_coarse(scene: ElementsScene) -> None:
+    """Refuse tracks that do not do."""
+    if isinstance(scene.coarse, TracksMotion):
+        _coarse_tracks(scene, scene.coarse)
+
+
+def check_output(scene: ElementsScene) -> None:
+    """Refuse a domain, or pictures of a control map or of selections, that do not do."""
+    _control(scene)
+    _maps(scene)
+    if scene.elements.domain is not None:
+        _shaped(scene)
 
 
 STATE = "elements.state.npz"
@@ -416,9 +562,10 @@ METHODS = ("synth.elements.synthesis", "synth.elements.initialize", "synth.eleme
 def products(scene: ElementsScene) -> tuple[Product, ...]:
     """The exemplar, the coarse motion, the output; and what is made of them to be looked at."""
     solid = obstacles.inputs(scene)
+    fitted = ("dimension",) if scene.exemplar.kind == "tracks" else ()
     example = Product(
         name="exemplar", stage="synth", folder="fields", suffix=_npz, animated=False,
-        reads=("exemplar", "elements.spacing", "elements.radius", "render.kind", "seed", "fps"), inputs=(),
+        reads=("exemplar", "elements.spacing", "elements.radius", "render.kind", "seed", "fps", *fitted), inputs=(),
         methods=("synth.elements.arrangement", "synth.elements.school", "synth.elements.simulation",
                  "synth.elements.handmade"), make=make_exemplar, write=write_tracks, read=read_tracks)
     made = [example]
@@ -433,10 +580,10 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
             reads=("coarse", "elements.count", "elements.spacing", "frames", "seed", "fps"),
             inputs=(("exemplar", "once"),),
             methods=("synth.elements.simulation", "synth.elements.scraps", "synth.elements.bundle"), make=make_coarse,
-            write=write_tracks, read=read_tracks))
+            write=write_tracks, read=read_tracks, check=check_coarse))
         coarse = (("coarse", "once"),)
     made.append(Product(
         name="elements", stage="synth", folder="fields", suffix=_npz, animated=False,
         reads=("elements", "synthesis", "frames", "seed", "fps"), inputs=(("exemplar", "once"), *coarse, *solid),
-        methods=METHODS, make=make_elements, write=write_output, read=read_tracks))
+        methods=METHODS, make=make_elements, write=write_output, read=read_tracks, check=check_output))
     return (*made, *looks.products(scene))

@@ -13,6 +13,7 @@ from pipeline.schema import (
     LARGEST,
     AnalyticMotion,
     Asset,
+    AssetOrFolder,
     FileMotion,
     Grid,
     NoiseMotion,
@@ -74,9 +75,11 @@ class TracksExemplar(Table):
     """Elements made elsewhere: tracked in a film (figure 11), simulated, modelled."""
 
     kind: Literal["tracks"] = key("positions over time")
-    file: Asset = key("CSV, the first PLY or OBJ of a numbered sequence, USD, or our own NPZ")
-    rate: float | None = key("of a file that does not say it; none: the scene's fps", None, "frames per second", gt=0,
-                             le=1000)
+    file: AssetOrFolder = key("CSV, a folder of one PLY or OBJ file per frame, USD, or our own NPZ; see above")
+    rate: float | None = key("none: what the file says, or else the scene's fps, to which the motion is resampled",
+                             None, "frames per second", gt=0, le=1000)
+    captured: bool = key("a shoal tracked in a film, x and y in pixels, y down (§6.4): its tracks are smoothed, and "
+                         "its mean motion is taken out; in space it is at depth 0", False)
 
 
 ElementsExemplar = ArrangedExemplar | DotsExemplar | ShoalExemplar | ThreadExemplar | SheetExemplar | TracksExemplar
@@ -98,7 +101,8 @@ class TracksMotion(Table):
     """C made elsewhere: by keyframes or a simulation."""
 
     kind: Literal["tracks"] = key("threads or sheets over time")
-    file: Asset = key("as of an exemplar of this kind; as many samples for an element as the exemplar has")
+    file: AssetOrFolder = key("as of an exemplar of this kind, in heights; as long as the animation, and as many "
+                              "samples for an element as the exemplar has")
 
 
 class Pin(Table):
@@ -249,6 +253,11 @@ class ElementsScene(Table):
     def cells(self) -> tuple[int, ...]:
         """Of the grid on which the domain is known, x first."""
         return self.elements.size
+
+    @property
+    def cells_key(self) -> str:
+        """The key that says them."""
+        return "elements.size"
 
     @property
     def dimension(self) -> int:

@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -23,6 +25,25 @@ class BadInput(FlowloomError):
     def __init__(self, file: Path | str, key: str, reason: str):
         self.file, self.key, self.reason = file, key, reason
         super().__init__(": ".join(str(part) for part in (file, key, reason) if str(part)))
+
+
+class WrongValue(ValueError):
+    """A value of a scene that does not do, as shows when something is made of it: its dotted key, and the reason."""
+
+    def __init__(self, key: str, reason: str):
+        self.key = key
+        super().__init__(reason)
+
+
+@contextmanager
+def blaming(key: str) -> Iterator[None]:
+    """What the methods refuse with ValueError is the fault of this key of the scene."""
+    try:
+        yield
+    except WrongValue:
+        raise
+    except ValueError as error:
+        raise WrongValue(key, str(error)) from error
 
 
 class EnvironmentMissing(FlowloomError):

@@ -71,7 +71,7 @@ def foreign_field(file: Path, key: str, dimension: int = 2) -> Field:
     if not field.is_vector:
         raise BadInput(file, key, "holds no vector field")
     if field.dimension < dimension:
-        raise BadInput(file, key, "is flat, and detail.size is not: it takes a VDB with a grid vel")
+        raise BadInput(file, key, "is flat, and the output is not: it takes a VDB with a grid vel")
     if field.dimension > dimension:
         field = Field(field.values[len(field.values) // 2, ..., :2], field.voxel_size, field.origin[:2])
     return field
@@ -123,8 +123,8 @@ def make_coarse(scene: AnyScene, stock: Stock, frames: list[int]) -> Iterator[tu
         steady = foreign_field(wanted.file, "coarse.file", scene.dimension)
         size, cells = steady.shape[::-1], scene.cells
         if any(n * size[1] != cells[1] * m for n, m in zip(cells, size, strict=True)):
-            raise BadInput(wanted.file, "coarse.file", f"{'×'.join(map(str, size))} has not the shape of the domain, "
-                                                       f"{'×'.join(map(str, cells))}")
+            raise BadInput(wanted.file, "coarse.file", f"{'×'.join(map(str, size))} has not the shape of "
+                                                       f"{scene.cells_key}, {'×'.join(map(str, cells))}")
         steady = Field.centred(steady.values, scene.dimension)
         if scene.obstacles:
             steady = Field.centred(_past_obstacles(scene, stock, steady.values), scene.dimension)

@@ -27,6 +27,7 @@ from pipeline.fields import (
 )
 from pipeline.files import meshes
 from pipeline.product import Frames, Product, Stock
+from pipeline.product import Scene as AnyScene
 from pipeline.schema import Scene
 from synth.field import Field, domain_origin
 
@@ -235,12 +236,12 @@ def read_points(file: Path, scene: Scene) -> Points:
     return meshes.read_points(file)
 
 
-def write_mesh(file: Path, mesh: Mesh, scene: Scene) -> None:
+def write_mesh(file: Path, mesh: Mesh, scene: AnyScene) -> None:
     """Write a mesh."""
     meshes.write(file, **mesh)
 
 
-def read_mesh(file: Path, scene: Scene) -> Mesh:
+def read_mesh(file: Path, scene: AnyScene) -> Mesh:
     """Read a mesh that `write_mesh` wrote."""
     return meshes.read_own(file)
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from pipeline import obstacles
 from pipeline.elements_schema import ElementsScene
-from pipeline.files import images, meshes
+from pipeline.geometry import read_mesh, write_mesh
+from pipeline.panels import read_light, suffix, write_light
 from pipeline.product import Frames, Product, Stock
 from synth.elements.mesh import Mesh
 from synth.elements.samples import Elements
@@ -76,16 +77,6 @@ def make_mesh(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator
     for frame in frames:
         found = mesh_of(scene, elements, frame - 1)
         yield frame, {"vertices": found.vertices, "faces": found.faces, "colours": found.colours}
-
-
-def write_mesh(file: Path, mesh: dict[str, np.ndarray], scene: ElementsScene) -> None:
-    """Write a mesh."""
-    meshes.write(file, **mesh)
-
-
-def read_mesh(file: Path, scene: ElementsScene) -> dict[str, np.ndarray]:
-    """Read a mesh that `write_mesh` wrote."""
-    return meshes.read_own(file)
 
 
 def make_stage(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
@@ -202,16 +193,6 @@ def make_coarse_picture(scene: ElementsScene, stock: Stock, frames: list[int]) -
         yield frame, _picture(scene, mesh, frame, None, _extent(coarse), scene.figure.panel, scene.render.spp)
 
 
-def write_light(file: Path, picture: np.ndarray, scene: ElementsScene) -> None:
-    """Write a linear picture (h, w, 3) in half floats."""
-    images.write_picture(file, picture, half=True)
-
-
-def read_light(file: Path, scene: ElementsScene) -> np.ndarray:
-    """Read a picture that `write_light` wrote."""
-    return images.read_picture(file)
-
-
 def products(scene: ElementsScene) -> tuple[Product, ...]:
     """The meshes, the USD file, and the pictures that the figure shows."""
     solid = obstacles.inputs(scene)
@@ -224,7 +205,7 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
         Product(name="animation", stage="bake", folder="geometry", suffix=lambda s: "usdc", animated=False,
                 reads=mesh_keys, inputs=(("elements", "once"),), methods=shape, make=make_stage, write=write_stage,
                 read=read_stage, export=True),
-        Product(name="beauty", stage="render", folder="images", suffix=lambda s: "exr",
+        Product(name="beauty", stage="render", folder="images", suffix=suffix,
                 reads=("render", "seed", "fps", *ground), inputs=(("mesh", "same"), ("elements", "once"), *solid),
                 methods=(f"render.{scene.render.kind}",), make=make_beauty, write=write_light, read=read_light)]
     look = (f"render.{scene.render.kind}", *shape)
@@ -236,7 +217,7 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
     for name, (make, inputs, methods) in pictures.items():
         if name in shown:
             made.append(Product(
-                name=f"{name}-picture", stage="render", folder="images", suffix=lambda s: "exr",
+                name=f"{name}-picture", stage="render", folder="images", suffix=suffix,
                 reads=("render", "figure.panel", "elements.spacing", "seed", "fps"), inputs=inputs, methods=methods,
                 make=make, write=write_light, read=read_light))
     return tuple(made)

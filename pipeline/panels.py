@@ -23,17 +23,17 @@ from pipeline.schema import Scene, is_of_exemplar
 ARROWS = 9  # across a picture
 
 
-def suffix(scene: Scene) -> str:
+def suffix(scene: AnyScene) -> str:
     """The suffix of a picture."""
     return "exr"
 
 
-def write_light(file: Path, picture: np.ndarray, scene: Scene) -> None:
+def write_light(file: Path, picture: np.ndarray, scene: AnyScene) -> None:
     """Write a linear picture (h, w, 3) in half floats."""
     images.write_picture(file, picture, half=True)
 
 
-def read_light(file: Path, scene: Scene) -> np.ndarray:
+def read_light(file: Path, scene: AnyScene) -> np.ndarray:
     """Read a picture that `write_light` wrote."""
     return images.read_picture(file)
 

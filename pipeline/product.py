@@ -46,6 +46,8 @@ class Product:
     write   write(file, value, scene); `read` is its inverse
     still   of an animated product: whether there is only the frame that the still shows
     export  made for other programs: nothing of ours reads it
+    check   refuses what can be known to be wrong before anything is made, files of the user's above all: raises
+            BadInput or ValueError
     memory  bytes that make takes at its peak, an estimate from above, and the key that decides it; None: little
     """
 
@@ -62,6 +64,7 @@ class Product:
     animated: bool = True
     still: bool = False
     export: bool = False
+    check: Callable[[Any], None] | None = None
     memory: Callable[[Any], tuple[float, str]] | None = None
 
     def file(self, scene: Scene, frame: int) -> str:
@@ -99,9 +102,10 @@ def value_at(scene: Scene, key: str) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """A scene value as JSON; a file as the SHA-256 of its bytes."""
+    """A scene value as JSON; a file as the SHA-256 of its bytes, a folder as those of its files."""
     if isinstance(value, Path):
-        return file_sha256(value)
+        return {f.name: file_sha256(f) for f in sorted(value.iterdir()) if f.is_file()} if value.is_dir() else (
+            file_sha256(value))
     if hasattr(value, "model_dump"):
         return _plain({name: getattr(value, name) for name in type(value).model_fields})
     if isinstance(value, dict):

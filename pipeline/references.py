@@ -142,6 +142,10 @@ def _read(works: stages.Works, variant: str, product: str, file: Path) -> np.nda
     if isinstance(value, Elements):
         return value.positions.reshape(len(value.positions), -1)
     if isinstance(value, dict):  # a mesh or points: all their numbers, in a square that a page can show
+        if "faces" in value:  # numbers of vertices and bytes of colour as shares: else they would drown the places
+            value = {**value, "faces": value["faces"] / len(value["vertices"])}
+            if "colours" in value:
+                value["colours"] = value["colours"] / 255
         numbers = np.concatenate([np.ravel(value[name]).astype(np.float32) for name in sorted(value)])
         side = math.isqrt(len(numbers) - 1) + 1
         return np.pad(numbers, (0, side * side - len(numbers))).reshape(side, side)

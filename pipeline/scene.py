@@ -24,7 +24,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from pipeline.elements_schema import ElementsScene
+from pipeline.elements_schema import ElementsScene, TracksExemplar, TracksMotion
 from pipeline.errors import BadInput
 from pipeline.product import Scene as AnyScene
 from pipeline.schema import Scene, ShapeObstacle, View, is_of_exemplar
@@ -228,7 +228,7 @@ def _did_you_mean(given: str, known: Any) -> str:
 def _fault_between_tables(scene: AnyScene) -> tuple[str, str]:
     """Dotted key and reason of values that are fine each and impossible together; ("", "") if all is well."""
     checks: Sequence[Callable[[Any], Faults]] = (
-        (_flat_and_deep, _exemplar, _grids, _views, _obstacles, _shown) if isinstance(scene, Scene) else
+        (_grids, _flat_and_deep, _exemplar, _views, _obstacles, _shown) if isinstance(scene, Scene) else
         (_element_kinds, _element_places, _grids, _obstacles, _shown))
     for faults in checks:
         for key, reason in faults(scene):
@@ -352,15 +352,11 @@ def _grids(scene: AnyScene) -> Faults:
     cells, coarse = scene.cells, getattr(scene.coarse, "size", None)
     if coarse is None:
         return
-    where = _cells_key(scene)
+    where = scene.cells_key
     if len(coarse) != len(cells):
         yield "coarse.size", f"{_sized(coarse)} has not as many axes as {where}, {_sized(cells)}"
     elif any(n * coarse[1] != cells[1] * m for n, m in zip(cells, coarse, strict=True)):
         yield where, f"{_sized(cells)} has not the shape of coarse.size, {_sized(coarse)}"
-
-
-def _cells_key(scene: AnyScene) -> str:
-    return "detail.size" if isinstance(scene, Scene) else "elements.size"
 
 
 def _obstacles(scene: AnyScene) -> Faults:
@@ -368,20 +364,23 @@ def _obstacles(scene: AnyScene) -> Faults:
     for number, obstacle in enumerate(scene.obstacles):
         if not isinstance(obstacle, ShapeObstacle):
             continue
-        if len(obstacle.centre) != scene.dimension:
-            yield (f"obstacles[{number}].centre",
-                   f"has {len(obstacle.centre)} coordinates; {_cells_key(scene)} is {_sized(scene.cells)}")
-        if len(obstacle.radius) not in (1, scene.dimension if obstacle.kind == "box" else 1):
-            yield f"obstacles[{number}].radius", f"has {len(obstacle.radius)} numbers for a {obstacle.kind}"
+        yield from _of_dimension(scene, obstacle, f"obstacles[{number}]")
     if isinstance(scene, Scene) and scene.obstacles and scene.detail.boundary and scene.detail.samples == "lagrangian":
         yield "detail.samples", "samples that move do not observe a boundary: say boundary = false"
     if scene.coarse is not None and scene.coarse.kind == "wake":
         if scene.dimension == 3:
-            yield "coarse.kind", f'"wake" is a flow of the plane; {_cells_key(scene)} is {_sized(scene.cells)}'
+            yield "coarse.kind", f'"wake" is a flow of the plane; {scene.cells_key} is {_sized(scene.cells)}'
         if scene.stone is None:
             yield "coarse.kind", '"wake" needs a stone, an [[obstacles]] with kind = "ball"'
         if len(scene.coarse.lengths) != len(scene.coarse.gains):
             yield "coarse.gains", f"{len(scene.coarse.gains)} gains for {len(scene.coarse.lengths)} lengths"
+
+
+def _of_dimension(scene: AnyScene, shape: ShapeObstacle, key: str) -> Faults:
+    if len(shape.centre) != scene.dimension:
+        yield f"{key}.centre", f"has {len(shape.centre)} coordinates; {scene.cells_key} is {_sized(scene.cells)}"
+    if len(shape.radius) not in (1, scene.dimension if shape.kind == "box" else 1):
+        yield f"{key}.radius", f"has {len(shape.radius)} numbers for a {shape.kind}"
 
 
 def _shown(scene: AnyScene) -> Faults:
@@ -398,35 +397,57 @@ def _shown(scene: AnyScene) -> Faults:
         yield "figure.panels", 'there is no "coarse" without a [coarse]'
 
 
-LOOKS = {"noodles": "noodles", "papers": "papers", "shoal": "shoal"}
-"""The [render] kind that an exemplar of elements asks for, where it asks."""
+LOOKS = {"noodles": ("noodles",), "papers": ("papers",), "shoal": ("shoal",),
+         "tracks": ("beads", "shoal", "noodles", "papers")}
+"""The [render] kinds that draw an exemplar of elements: "beads" those that are not here."""
+CARRIED = {"noodles": ("lifted", "tracks"), "papers": ("gust", "tracks")}
+"""The kinds of [coarse] that threads and sheets have, by their [render] kind."""
 
 
 def _element_kinds(scene: ElementsScene) -> Faults:
     """Exemplar, coarse motion and picture of one topology, in a domain of the exemplar's dimension."""
-    exemplar, coarse, render = scene.exemplar.kind, scene.coarse, scene.render.kind
-    threads = {"noodles": ("lifted", "tracks"), "papers": ("gust", "tracks")}
-    if exemplar in threads:
-        if coarse is None or coarse.kind not in threads[exemplar]:
-            yield "coarse.kind", f'of {exemplar} is one of {", ".join(threads[exemplar])}'
-    elif exemplar != "tracks" and coarse is not None and not scene.flows:
-        yield "coarse.kind", f'"{coarse.kind}" carries threads or sheets, no {exemplar}'
-    if exemplar in LOOKS and render != LOOKS[exemplar]:
-        yield "render.kind", f'"{render}" draws no {exemplar}: say "{LOOKS[exemplar]}"'
-    flat = exemplar in ("poisson-disk", "jittered-grid", "hexagonal-grid", "dots") or render == "beads"
-    if (flat and scene.dimension == 3) or (not flat and scene.dimension == 2):
-        yield "elements.size", f"{_sized(scene.cells)} has not the axes of a domain of {exemplar} drawn as {render}"
+    exemplar, coarse, render = scene.exemplar, scene.coarse, scene.render.kind
+    looks = LOOKS.get(exemplar.kind, ("beads",))
+    if render not in looks:
+        yield "render.kind", f'"{render}" draws no {exemplar.kind}: say "{looks[0]}"'
+    if isinstance(exemplar, TracksExemplar) and exemplar.captured and render not in ("beads", "shoal"):
+        yield "exemplar.captured", f'is for points, not for {render}'
+    if render in CARRIED:
+        if coarse is None or coarse.kind not in CARRIED[render]:
+            yield "coarse" if coarse is None else "coarse.kind", f'of {render} is one of {", ".join(CARRIED[render])}'
+        yield from _for_points_alone(scene, render)
+        return
+    if coarse is not None and not scene.flows:
+        yield "coarse.kind", f'"{coarse.kind}" carries threads or sheets, no {render}'
+    if scene.dimension != (2 if render == "beads" else 3):
+        yield "elements.size", f"is {_sized(scene.cells)}; " + (
+            "beads lie in the plane" if render == "beads" else f"{render} is in space: it takes a third number")
+
+
+def _for_points_alone(scene: ElementsScene, render: str) -> Faults:
+    """Keys that threads and sheets do not heed, which are where their coarse motion is."""
+    wanted, reason = scene.elements, f"is for points; {render} go where their [coarse] is"
+    heeded = {"elements.domain": wanted.domain, "elements.toroidal": wanted.toroidal, "elements.pins": wanted.pins,
+              "elements.selections": wanted.selections, "elements.control": wanted.control,
+              "obstacles": scene.obstacles}
+    yield from ((key, reason) for key, value in heeded.items() if value)
+    if wanted.along != "exemplar":
+        yield "elements.along", reason
+    if isinstance(scene.coarse, TracksMotion) and wanted.count:
+        yield "elements.count", "is that of coarse.file"
+    if scene.synthesis.sequence == "frames":
+        yield "synthesis.sequence", f'"frames" is for points; of {render} all frames are synthesized together'
 
 
 def _element_places(scene: ElementsScene) -> Faults:
     """Domain, hard positions and sequence."""
     wanted, synthesis = scene.elements, scene.synthesis
-    if isinstance(wanted.domain, ShapeObstacle) and len(wanted.domain.centre) != scene.dimension:
-        yield ("elements.domain.centre",
-               f"has {len(wanted.domain.centre)} coordinates; elements.size is {_sized(scene.cells)}")
+    if isinstance(wanted.domain, ShapeObstacle):
+        yield from _of_dimension(scene, wanted.domain, "elements.domain")
     for number, pin in enumerate(wanted.pins):
         if len(pin.at) != scene.dimension:
-            yield f"elements.pins[{number}].at", f"has {len(pin.at)} coordinates; the domain has {scene.dimension}"
+            yield (f"elements.pins[{number}].at",
+                   f"has {len(pin.at)} coordinates; elements.size is {_sized(scene.cells)}")
         if pin.frame > scene.frames:
             yield f"elements.pins[{number}].frame", f"the animation has {scene.frames} frames"
     if synthesis.sequence == "frames" and synthesis.after:

@@ -16,6 +16,24 @@ LARGEST = 4096  # cells or pixels along an axis; beyond it a slip of the keyboar
 
 def _inside(name: Path, info: ValidationInfo) -> Path:
     """The existing file `name`: relative, inside the scene's folder, or inside the project's scenes/assets."""
+    found = _there(name, info)
+    if not found.is_file():
+        raise ValueError(f"'{name}' is not a file")
+    return found
+
+
+def _inside_or_folder(name: Path, info: ValidationInfo) -> Path:
+    """The same, or a folder there, whose files are links to none outside it."""
+    found = _there(name, info)
+    if not found.is_dir():
+        return _inside(name, info)
+    for file in found.iterdir():
+        if not file.resolve().is_relative_to(found):
+            raise ValueError(f"'{name}/{file.name}' is a link that leaves its folder")
+    return found
+
+
+def _there(name: Path, info: ValidationInfo) -> Path:
     if name.is_absolute() or ".." in name.parts:
         raise ValueError(f"'{name}' leaves the scene's folder; write a path relative to it, without ..")
     folder: Path = info.context["folder"] if info.context else Path()
@@ -28,8 +46,6 @@ def _inside(name: Path, info: ValidationInfo) -> Path:
             raise ValueError(f"'{name}' cannot be a file ({error})") from error
         if not found.is_relative_to(home.resolve()):
             raise ValueError(f"'{name}' is a link that leaves the scene's folder")
-        if not found.is_file():
-            raise ValueError(f"'{name}' is not a file")
         return found
     raise ValueError(f"no file '{name}' in the scene's folder or the project's scenes/assets")
 
@@ -48,6 +64,7 @@ def key(description: str, default: Any = ..., unit: str = "", **limits: Any) -> 
 
 
 Asset = Annotated[Path, Strict(False), AfterValidator(_inside)]
+AssetOrFolder = Annotated[Path, Strict(False), AfterValidator(_inside_or_folder)]
 
 
 def _odd(width: int) -> int:
@@ -491,6 +508,11 @@ class Scene(Table):
     def cells(self) -> tuple[int, ...]:
         """Of H and F, x first."""
         return self.detail.size
+
+    @property
+    def cells_key(self) -> str:
+        """The key that says them."""
+        return "detail.size"
 
     @property
     def shape(self) -> tuple[int, ...]:

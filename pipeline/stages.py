@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline import elements, fields, geometry, manifest, obstacles, panels, sources
-from pipeline.errors import BadInput, StorageFailed
+from pipeline.errors import BadInput, StorageFailed, WrongValue
 from pipeline.manifest import Entry, Folder
 from pipeline.product import Product, Scene
 from pipeline.progress import Progress
@@ -178,13 +178,19 @@ class Works:
         return names
 
     def _check_foreign_files(self, names: Iterable[str]) -> None:
-        """Read every file of the user's that is still needed, before anything is written."""
+        """Read every file of the user's that is still needed, and check what else can be, before anything is written.
+        """
         for name in names:
             for variant in self.makers(name):
                 product, scene = self.products[variant][name], self.scenes.variants[variant]
-                missing = self.missing(variant, name, product.frames(scene)) if product.reads_files(scene) else []
-                if missing and not product.inputs:
-                    with self._blaming(product):
+                first = product.check is None and not product.inputs and product.reads_files(scene)
+                missing = self.missing(variant, name, product.frames(scene)) if first or product.check else []
+                if not missing:
+                    continue
+                with self._blaming(product):
+                    if product.check:
+                        product.check(scene)
+                    else:
                         next(product.make(scene, _Stock(self, variant, product), missing[:1]))
 
     @contextmanager
@@ -193,11 +199,14 @@ class Works:
         try:
             yield
         except ValueError as error:
-            raise BadInput(self.scenes.file, product.reads[0], str(error)) from error
+            key = error.key if isinstance(error, WrongValue) else product.reads[0]
+            raise BadInput(self.scenes.file, key, str(error)) from error
 
     def _make(self, variant: str, name: str, frames: Sequence[int] | None, progress: Progress) -> None:
         product, scene = self.products[variant][name], self.scenes.variants[variant]
         wanted = [f for f in product.frames(scene) if frames is None or not product.animated or f in frames]
+        if product.export and not product.animated and frames is not None and scene.frames not in frames:
+            return  # nothing reads it: of several batches of frames the last one makes it
         for other, which in product.inputs:
             needed = {"same": wanted, "until": range(1, max(wanted, default=0) + 1), "once": [0],
                       "every": range(1, scene.frames + 1)}

@@ -261,7 +261,7 @@ def test_a_field_too_large_for_memory_is_refused_with_its_size(
 
 
 @pytest.mark.parametrize(("name", "made", "expected"), [
-    ("a.exr", field(), "is flat, and detail.size is not"),
+    ("a.exr", field(), "is flat, and the output is not"),
     ("a.vdb", field(shape=(16, 16, 24, 3)), "24×16×16 has not the shape of detail.size, 16×16×16"),
     ("a.vdb", field(shape=(16, 16, 16, 3), value=1e30), "cells per frame"),
 ])

@@ -28,7 +28,7 @@ HOMES = {
     "rlic": {"render/lic.py"},
     "threadpoolctl": {"synth/motion/neighborhood.py", "synth/elements/assignment.py"},
     "cyclopts": {"pipeline/cli.py"},
-    "pydantic": {"pipeline/schema.py", "pipeline/scene.py"},  # the tables; loading a file into them
+    "pydantic": {"pipeline/schema.py", "pipeline/elements_schema.py", "pipeline/scene.py"},  # tables; filling them
     "rich": {"pipeline/progress.py"},
     "faiss": {"bench/"},  # a peer that the bench runs beside us
 }

@@ -1,4 +1,4 @@
-"""scenes/README.md documents every table and key of the schema; `python tests/test_schema.py` writes its tables."""
+"""scenes/README.md documents every table and key of the schemas; `python tests/test_schema.py` writes its tables."""
 
 import re
 import types
@@ -11,11 +11,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from pipeline import schema
+from pipeline import elements_schema, schema
 
 README = schema.PROJECT_SCENES / "README.md"
-START, END = "<!-- tables: written by tests/test_schema.py -->", "<!-- end of tables -->"
-
+BY = "written by tests/test_schema.py"
 
 HEAD = ("| key | what | type and range | unit | default |", "|---|---|---|---|---|")
 
@@ -35,6 +34,12 @@ def tables(model: type[BaseModel] = schema.Scene, path: str = "") -> list[tuple[
             found += [(at, one) for at, one in tables(table, f"{path}.{name}" if path else name)
                       if one not in [known for _, known in found]]
     return found
+
+
+def shared() -> dict[type[BaseModel], str]:
+    """The tables that both kinds of scene have, and their paths in the first."""
+    there = {model for _, model in tables(elements_schema.ElementsScene)}
+    return {model: path for path, model in tables() if model in there}
 
 
 def limits(metadata: object) -> str:
@@ -101,29 +106,51 @@ def row(name: str, field: FieldInfo) -> str:
 
 
 def heading(path: str, model: type[BaseModel]) -> str:
-    """A table's heading: its path, and the kinds that this form of it is for."""
+    """What a table is called: its path, and the kinds that this form of it is for."""
     kind = model.model_fields.get("kind")
     kinds = ", ".join(f'"{k}"' for k in typing.get_args(kind.annotation)) if kind and "." not in path else ""
-    return f"### {f'[{path}]' if path else 'Top of the file'}" + (f" kind = {kinds}" if kinds else "")
+    return (f"[{path}]" if path else "Top of the file") + (f" kind = {kinds}" if kinds else "")
 
 
-def documentation() -> str:
-    """All tables of the schema in Markdown."""
-    parts = []
-    for path, model in tables():
-        purpose = " ".join((model.__doc__ or "").split())
-        rows = [row(name, field) for name, field in model.model_fields.items()]
-        parts.append("\n".join([heading(path, model), "", purpose, "", *HEAD, *rows, ""]))
-    return "\n".join(parts)
+def table_of(path: str, model: type[BaseModel]) -> str:
+    """A table in Markdown."""
+    purpose = " ".join((model.__doc__ or "").split())
+    rows = [row(name, field) for name, field in model.model_fields.items()]
+    return "\n".join([f"### {heading(path, model)}", "", purpose, "", *HEAD, *rows, ""])
 
 
-def test_the_readme_documents_every_table_and_key_as_the_schema_has_them() -> None:
-    text = README.read_text()
-    written = text[text.index(START) + len(START):text.index(END)].strip()
-    assert written == documentation().strip(), "type: .venv/bin/python tests/test_schema.py"
+def documentation() -> dict[str, str]:
+    """The tables of both kinds of scene in Markdown, by the name of their place in the README; what is shared stands
+    in the first and is named in the second."""
+    also = [f"`{heading(path, model)}`" for model, path in shared().items()]
+    return {
+        "tables": "\n".join(table_of(path, model) for path, model in tables()),
+        "tables of elements": "\n".join([
+            *(table_of(path, model) for path, model in tables(elements_schema.ElementsScene) if model not in shared()),
+            f"As above, what is said of detail.size there being meant of elements.size: {', '.join(also)}."])}
 
 
-@pytest.mark.parametrize(("path", "model"), tables())
+def around(name: str, text: str) -> tuple[str, str, str]:
+    """What stands in a text before a place of the README, in it and after it."""
+    before, rest = text.split(f"<!-- {name}: {BY} -->")
+    inside, after = rest.split(f"<!-- end of {name} -->")
+    return before, inside.strip(), after
+
+
+@pytest.mark.parametrize(("name", "content"), documentation().items())
+def test_the_readme_documents_every_table_and_key_as_the_schema_has_them(name: str, content: str) -> None:
+    assert around(name, README.read_text())[1] == content.strip(), "type: .venv/bin/python tests/test_schema.py"
+
+
+def test_what_both_kinds_of_scene_have_is_documented_once() -> None:
+    names = {model.__name__ for model in shared()}
+    assert {"NoiseMotion", "FileMotion", "ShapeObstacle", "MeshObstacle"} <= names
+    written = README.read_text().splitlines()
+    for model, path in shared().items():
+        assert written.count(f"### {heading(path, model)}") == 1
+
+
+@pytest.mark.parametrize(("path", "model"), [*tables(), *tables(elements_schema.ElementsScene)])
 def test_every_number_has_a_range_and_every_key_a_description(path: str, model: type[BaseModel]) -> None:
     for name, field in model.model_fields.items():
         assert field.description or branches(field.annotation), f"{path}.{name} is not described"
@@ -133,12 +160,13 @@ def test_every_number_has_a_range_and_every_key_a_description(path: str, model: 
 
 
 def test_every_table_refuses_what_it_does_not_know() -> None:
-    for _, model in tables():
+    for _, model in [*tables(), *tables(elements_schema.ElementsScene)]:
         config = model.model_config
         assert (config["extra"], config["strict"], config["frozen"], config["allow_inf_nan"]) == (
             "forbid", True, True, False)
 
 
 if __name__ == "__main__":
-    before, after = README.read_text().split(START)[0], README.read_text().split(END)[1]
-    README.write_text(f"{before}{START}\n\n{documentation()}\n{END}{after}")
+    for name, content in documentation().items():
+        before, _, after = around(name, README.read_text())
+        README.write_text(f"{before}<!-- {name}: {BY} -->\n\n{content}\n<!-- end of {name} -->{after}")

@@ -151,12 +151,12 @@ def _require_all(path: Path, key: str, frames: list[int]) -> None:
             raise BadInput(path, key, f"frame {one + 1} is missing")
 
 
-def read_foreign(path: Path, key: str, *, rate: float | None = None, dimensions: int = 2, prim: str = "/",
-                 fewest_elements: int = 2, fewest_frames: int = 1) -> Elements:
+def read_foreign(path: Path, key: str, *, rate: float | None = None, otherwise: float = 24.0, dimensions: int = 2,
+                 prim: str = "/", fewest_elements: int = 2, fewest_frames: int = 1) -> Elements:
     """The elements of anybody's file, folder or sequence, see above; read in a child process.
 
     key         the scene's, for the error
-    rate        frames per second; none: what the file says, 24 if it says nothing
+    rate        frames per second; none: what the file says, `otherwise` if it says nothing
     dimensions  2 or 3: of a wide table whose names do not say it
     prim        of a USD file: only what is at or below this path
     Positions are 3-D, but 2-D from a table without z. Raises `BadInput`.
@@ -182,7 +182,7 @@ def read_foreign(path: Path, key: str, *, rate: float | None = None, dimensions:
     if "fault" in found:
         raise BadInput(found["file"], key, found["fault"])
     try:
-        elements = _elements({**found, "rate": rate or found.get("rate", 24.0)})
+        elements = _elements({**found, "rate": rate or found.get("rate", otherwise)})
         if not 0 < elements.rate < 1e5:
             raise ValueError(f"a rate of {elements.rate:g} frames per second")
     except ValueError as error:

@@ -11,8 +11,24 @@
     Θ        constraints of the output (Eq. 5)
     C        coarse motion and shape, D = I - C the details (§5)
 
-The modules: samples (what elements are), mesh (their surfaces).
+The modules, in the order data passes through them:
 
-The exemplars I and coarse motions C: arrangement (points at rest), school (fish), simulation (noodles, paper),
-handmade (the same by hand), bundle (threads side by side), scraps (paper in a gust).
+    samples        what elements are: positions over time
+    arrangement    exemplars of points at rest
+    school         exemplars of fish
+    simulation     noodles and paper by physical simulation
+    handmade       the same by hand
+    bundle         C of threads: one motion for all, side by side
+    scraps         C of sheets: paper in a gust
+    decomposition  C of elements that were made elsewhere
+    orientation    local frames of samples
+    neighborhood   n(s), in space and time
+    search         the exemplar samples that are most like each output sample
+    constraints    Θ: domain, hard positions
+    initialize     the first guess: patches of the exemplar
+    assignment     positions by what the matches predict
+    collision      the extra solver step
+    synthesis      all of it, all frames together or frame by frame
+    fidelity       how like its exemplar an output is
+    mesh           surfaces of elements
 """

@@ -53,10 +53,9 @@ def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spaci
     dims = exemplar.dimensions
     start = exemplar.positions[0, :, 0]
     toroidal = exemplar.box is not None
-    box = exemplar.box if exemplar.box is not None else np.stack([start.min(axis=0), start.max(axis=0)])
-    density = exemplar.count / float(np.prod(box[1] - box[0]))
+    box = _box(exemplar, spacing)
     volume = float((domain.inside > 0).sum()) * domain.cell**dims
-    expected = count or max(2, round(density * volume))
+    expected = count or as_dense(exemplar, domain, spacing)
     if volume < radius**dims:
         raise ValueError("the domain is smaller than a neighbourhood")
     placed = np.zeros((0, dims)) if pins is None else pins.astype(np.float64)
@@ -80,6 +79,24 @@ def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spaci
     placed, source = _counted(placed, source, expected, 0 if pins is None else len(pins), domain, exemplar, allowed,
                               rng)
     return _over_time(exemplar, placed, source, frames, turn)
+
+
+def as_dense(exemplar: Elements, domain: Domain, spacing: float) -> int:
+    """How many elements make a domain as dense as the exemplar, 2 or more."""
+    low, high = _box(exemplar, spacing)
+    volume = float((domain.inside > 0).sum()) * domain.cell**exemplar.dimensions
+    return max(2, round(exemplar.count / float(np.prod(high - low)) * volume))
+
+
+def _box(exemplar: Elements, spacing: float) -> np.ndarray:
+    """What the exemplar fills in its first frame, (2, D): its unit, or what is round its elements, a spacing or more
+    along each axis (one that is flat is a layer)."""
+    if exemplar.box is not None:
+        return exemplar.box
+    start = exemplar.positions[0, :, 0]
+    low, high = start.min(axis=0), start.max(axis=0)
+    missing = np.maximum(0, spacing - (high - low)) / 2
+    return np.stack([low - missing, high + missing])
 
 
 def _places(domain: Domain, radius: float, pins: np.ndarray) -> np.ndarray:
@@ -122,9 +139,8 @@ def _patch(start: np.ndarray, box: np.ndarray, toroidal: bool, centre: np.ndarra
     frame = np.eye(len(centre)) if turn is None else turn(centre[None])[0].astype(np.float64)
     tree = _tree(domain, placed) if len(placed) else None
     period = box[1] - box[0]
-    inner = np.minimum(radius, period / 2)
-    tries = [(rng.uniform(box[0], box[1]) if toroidal else rng.uniform(box[0] + inner, box[1] - inner), 0.0)
-             for _ in range(TRIES)]
+    room = period / 2 if toroidal else np.maximum(0, period / 2 - radius)
+    tries = [(rng.uniform(-room, room) + (box[0] + box[1]) / 2, 0.0) for _ in range(TRIES)]
     nearest = sorted(cut, key=lambda c: float(np.sum((c[0] - centre) ** 2)))[:GO_ON]
     going_on = [middle + frame.T @ (centre - other) for other, middle in nearest]
     tries += [(middle, CONTINUE) for middle in going_on

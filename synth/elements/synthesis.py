@@ -220,7 +220,7 @@ def together(within: Exemplar, start: Elements, source: np.ndarray, guides: Guid
              kept: Mapping[str, np.ndarray] | None = None) -> Iterator[Optimizer]:
     """All frames together, non-causal: the optimizer after each iteration; its `result` after the last.
 
-    kept   the `state` of an interrupted run after some iteration
+    kept   the `state` of an interrupted run after some iteration, which comes first then
     """
     optimizer = Optimizer(within, start, source, guides, settings)
     every = np.arange(start.frames)
@@ -228,6 +228,7 @@ def together(within: Exemplar, start: Elements, source: np.ndarray, guides: Guid
         optimizer.correct(every)
     else:
         optimizer.restore(kept)
+        yield optimizer
     for _ in range(len(optimizer.energies), settings.iterations):
         optimizer.iterate(every, start.frames)
         yield optimizer
@@ -239,7 +240,7 @@ def by_frames(within: Exemplar, first: Elements, source: np.ndarray, frames: int
     frame; its `result` after the last.
 
     first   one frame: the output as it is initialized; source (E·S,) what each sample was copied from
-    kept    the `state` of an interrupted run after some frame
+    kept    the `state` of an interrupted run after some frame, which comes first then
     Raises ValueError for a neighbourhood with frames after its own.
     """
     if within.shape.after:
@@ -250,6 +251,7 @@ def by_frames(within: Exemplar, first: Elements, source: np.ndarray, frames: int
     optimizer = Optimizer(within, start, sources, guides, settings)
     if kept is not None:
         optimizer.restore(kept)
+        yield optimizer
     for frame in range(len(optimizer.energies) // settings.iterations, frames):
         if frame:
             _advected(optimizer, frame)
