@@ -206,6 +206,8 @@ class PapersRender(Table):
     width: int = key("of the picture", 960, "pixels", ge=16, le=LARGEST)
     height: int = key("of the picture", 540, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
+    colour: Literal["exemplar", "mixed"] = key(
+        "of a sheet: that of what it was copied from, or by chance of a few that go together", "mixed")
 
 
 ElementsPanel = Literal["exemplar", "coarse", "result"]

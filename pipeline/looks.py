@@ -37,7 +37,8 @@ def mesh_of(scene: ElementsScene, elements: Elements, frame: int) -> Mesh:
         case "noodles":
             return mesh.tubes(elements.positions[frame], elements.size, elements.colour)
     rows, columns = elements.grid
-    return mesh.sheets(elements.positions[frame].reshape(elements.count, rows, columns, 3), elements.colour)
+    return mesh.sheets(elements.positions[frame].reshape(elements.count, rows, columns, 3),
+                       _paper_colours(scene, elements))
 
 
 ORIGINS = np.array([[0.10, 0.32, 0.42], [0.16, 0.55, 0.58], [0.93, 0.78, 0.42], [0.90, 0.48, 0.26], [0.62, 0.16, 0.20]])
@@ -53,6 +54,19 @@ def _bead_colours(scene: ElementsScene, elements: Elements) -> np.ndarray:
     x = elements.positions[0, :, 0, 0]
     share = (np.argsort(np.argsort(x, kind="stable"), kind="stable") + 0.5) / elements.count * (len(ORIGINS) - 1)
     return np.stack([np.interp(share, np.arange(len(ORIGINS)), ORIGINS[:, c]) for c in range(3)], axis=-1)
+
+
+SHARES = (0.40, 0.25, 0.14, 0.12, 0.09)  # of the sheets, of each colour of papers.PALETTE
+
+
+def _paper_colours(scene: ElementsScene, elements: Elements) -> np.ndarray:
+    """Colours (E, 3) of the sheets."""
+    from render.papers import PALETTE
+
+    if scene.render.kind != "papers" or scene.render.colour == "exemplar":
+        return elements.colour
+    rng = np.random.Generator(np.random.Philox(key=scene.seed))
+    return np.array(PALETTE)[rng.choice(len(PALETTE), elements.count, p=SHARES)]
 
 
 def _in_domain(scene: ElementsScene, points: np.ndarray) -> np.ndarray:
@@ -94,7 +108,7 @@ def write_stage(file: Path, elements: Elements, scene: ElementsScene) -> None:
 
     def sheets(frame: int) -> dict[str, Any]:
         surface = elements.positions[frame - 1].reshape(elements.count, *elements.grid, 3)
-        return {"sheets": mesh.shells(surface, elements.size, elements.colour)}
+        return {"sheets": mesh.shells(surface, elements.size, _paper_colours(scene, elements))}
 
     stage.write(file, elements, {"shoal": fish, "papers": sheets}.get(scene.render.kind))
 
