@@ -159,7 +159,7 @@ class Synthesis(Table):
     whole: bool = key("neighbours in all these frames, not only the sample itself (figure 3)", False)
     sigma_p: float = key("falloff in space (Eq. 10); 0: none", 0.0, "neighbourhoods", ge=0, le=1000)
     matches: int = key("N, that predict together (§4.2)", 2, ge=1, le=4)
-    iterations: int = key("of search and assignment", 8, ge=1, le=200)
+    iterations: int = key("of search and assignment, at most", 8, ge=1, le=200)
     sequence: Literal["frames", "together"] = key("frame by frame, or all frames together", "together")
     search: Literal["exact", "k-coherence"] = key("exhaustive, or k-coherence", "k-coherence")
     assignment: Literal["sparse", "local"] = key(

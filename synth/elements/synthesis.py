@@ -23,12 +23,15 @@ Flow = Callable[[int, np.ndarray], np.ndarray]
 Turn = Callable[[int, np.ndarray], np.ndarray]
 """Local frames (M, D, D) at points (M, D) in frame t."""
 
+SAME = 1e-6  # energy of a sample, in squared radii of its neighbourhood, below which it is as in the exemplar
+STAYS = 1e-3  # share by which the energy falls when there is no more to gain
+
 
 @dataclass(frozen=True)
 class Settings:
     """How an output is optimized.
 
-    iterations  of search and assignment
+    iterations  of search and assignment, at most; all frames together, fewer where the energy stays
     n           matches that predict together (§4.2: 2; 1 is the basic synthesis of §4.1)
     coherent    k-coherence, else exhaustive search
     solver      "sparse": all positions at once; "local": each by its neighbours as constants, `sweeps` times
@@ -229,9 +232,17 @@ def together(within: Exemplar, start: Elements, source: np.ndarray, guides: Guid
     else:
         optimizer.restore(kept)
         yield optimizer
-    for _ in range(len(optimizer.energies), settings.iterations):
+    while len(optimizer.energies) < settings.iterations and not _is_settled(optimizer):
         optimizer.iterate(every, start.frames)
         yield optimizer
+
+
+def _is_settled(optimizer: Optimizer) -> bool:
+    """Whether another iteration would find the same: the matches are the exemplar's own, or the energy stays."""
+    energies, radius = optimizer.energies, optimizer.within.shape.radius
+    if energies and energies[-1] < SAME * radius**2:
+        return True
+    return len(energies) > 1 and 0 <= energies[-2] - energies[-1] < STAYS * energies[-2]
 
 
 def by_frames(within: Exemplar, first: Elements, source: np.ndarray, frames: int, guides: Guides, settings: Settings,
