@@ -2,7 +2,7 @@
 
 A reference is a folder tests/references/<scene>/, or references/<scene>/ beside a scene that is not the
 project's. It holds the frame that the figure shows of every product of synth and bake, as the stages write
-it; a small proof of that frame, `proof.exr`, for each different picture; and `reference.json`, written last:
+it, but for files above LARGEST; a small proof of that frame, `proof.exr`, for each different picture; and `reference.json`, written last:
 the sums of every frame, the SHA-256 of each file, and the versions that rendered the proofs.
 """
 
@@ -32,6 +32,7 @@ from synth.elements.samples import Elements
 RECORD = "reference.json"
 PROOF = "proof.exr"
 PROOF_WIDTH, PROOF_SAMPLES = 96, 8
+LARGEST = 700_000  # bytes of a file that is kept
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Made:
     works: stages.Works
     variant: str
     product: str
-    is_shown: bool
+    is_kept: bool
 
     def values(self, file: Path) -> np.ndarray:
         """The values of `file`, which is this one or its reference."""
@@ -84,7 +85,9 @@ def contents(works: stages.Works) -> Iterator[Made]:
                 if file not in seen:
                     seen.add(file)
                     path = file.relative_to(works.root).as_posix()
-                    yield Made(path, file, works, variant, product.name, frame in (0, shown_frame(scene)))
+                    # of a large mesh the sums are enough: its proof shows it
+                    is_kept = frame in (0, shown_frame(scene)) and file.stat().st_size <= LARGEST
+                    yield Made(path, file, works, variant, product.name, is_kept)
 
 
 def proofs(works: stages.Works) -> Iterator[Proof]:
@@ -186,7 +189,7 @@ def write(scene_file: Path, out: Path, progress: Progress) -> str:
     kept: dict[str, bytes] = {}
     for made in contents(works):
         record["sums"][made.path] = sums(made.values(made.file))
-        if made.is_shown:
+        if made.is_kept:
             kept[made.path] = made.file.read_bytes()
     for proof in proofs(works):
         record["proofs"][proof.path] = proof.made_with
