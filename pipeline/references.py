@@ -1,9 +1,10 @@
 """What a scene gives at its [quick] settings, and the reference that keeps it (`flowloom references`).
 
 A reference is a folder tests/references/<scene>/, or references/<scene>/ beside a scene that is not the
-project's. It holds the frame that the figure shows of every product of synth and bake, as the stages write
-it, but for files above LARGEST; a small proof of that frame, `proof.exr`, for each different picture; and `reference.json`, written last:
-the sums of every frame, the SHA-256 of each file, and the versions that rendered the proofs.
+project's. It holds the frame that the figure shows of every product of synth and bake, as the stages write it, but
+for files above LARGEST; a small proof of that frame, `proof.exr`, for each different picture; and
+`reference.json`, written last: the sums of every frame, the SHA-256 of each file, and the versions that rendered
+the proofs.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from synth.elements.samples import Elements
 RECORD = "reference.json"
 PROOF = "proof.exr"
 PROOF_WIDTH, PROOF_SAMPLES = 96, 8
-LARGEST = 700_000  # bytes of a file that is kept
+LARGEST = 1_000_000  # bytes of a file that is kept
 
 
 @dataclass(frozen=True)
