@@ -32,6 +32,7 @@ TOPOLOGIES = {"beads": "none", "shoal": "none", "noodles": "thread", "papers": "
 PLURALS = {"none": "points", "thread": "threads", "sheet": "sheets"}
 SIZES = {"none": 0.8, "thread": 0.38, "sheet": 0.02}
 """Length of a fish, radius of a thread, thickness of a sheet whose file does not say it, spacings."""
+THREAD = 4  # samples or more
 CROWDED = 0.6  # spacings: an output whose elements cannot be farther apart than that holds too many
 
 
@@ -85,6 +86,8 @@ def _from_tracks(scene: ElementsScene, wanted: TracksExemplar) -> Elements:
     if found.topology != TOPOLOGIES[drawn]:
         raise WrongValue("render.kind", f'"{drawn}" draws {PLURALS[TOPOLOGIES[drawn]]}; the elements of '
                                         f"{wanted.file.name} are {PLURALS[found.topology]}")
+    if found.topology == "thread" and found.grid[0] < THREAD:
+        raise ValueError(f"threads of {found.grid[0]} samples; it takes {THREAD} or more")
     if wanted.captured:
         from synth.elements import school
 
@@ -469,7 +472,9 @@ def make_coarse(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterat
         if example.grid[0] != example.grid[1]:
             raise WrongValue("coarse.kind", f'"gust" tosses square sheets; those of the exemplar are '
                                             f"{_sized(example.grid)}")
-        yield 0, _scaled(scraps.tossed(count, side=example.grid[0], **settings), spacing)
+        with blaming("elements.count"):
+            tossed = scraps.tossed(count, side=example.grid[0], **settings)
+        yield 0, _scaled(tossed, spacing)
         return
     thick = float(np.linalg.norm(bundle.section(count, 1.0), axis=1).max()) + 0.5
     length = float(np.linalg.norm(np.diff(example.coarse[0, 0], axis=0), axis=-1).sum()) / spacing

@@ -153,7 +153,7 @@ class Elements(Table):
 class Synthesis(Table):
     """The synthesis (§4.1, §4.2, Table 2)."""
 
-    neighborhood: float = key("radius", 2.0, "spacings", gt=0, le=10)
+    neighborhood: float = key("radius", 2.0, "spacings", ge=1, le=10)
     before: int = key("frames of the neighbourhood before its own", 0, "frames", ge=0, le=60)
     after: int = key("frames after it, with sequence = \"together\"", 0, "frames", ge=0, le=60)
     whole: bool = key("neighbours in all these frames, not only the sample itself (figure 3)", False)
@@ -240,7 +240,7 @@ class ElementsScene(Table):
     source: str = key("the figure it reproduces or what it is made after", "", max_length=200)
     seed: int = key("of every random choice", 1, ge=0, le=2**31 - 1)
     frames: int = key("length of the animation", 60, "frames", ge=1, le=100000)
-    fps: float = key("speed of the animation", 24, "frames per second", gt=0, le=1000)
+    fps: float = key("speed of the animation", 24, "frames per second", ge=1, le=1000)
     exemplar: ElementsExemplar = Field(discriminator="kind")
     elements: Elements
     coarse: Annotated[ElementsCoarse, Field(discriminator="kind")] | None = key(

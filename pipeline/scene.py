@@ -412,6 +412,8 @@ def _element_kinds(scene: ElementsScene) -> Faults:
         yield "render.kind", f'"{render}" draws no {exemplar.kind}: say "{looks[0]}"'
     if isinstance(exemplar, TracksExemplar) and exemplar.captured and render not in ("beads", "shoal"):
         yield "exemplar.captured", f'is for points, not for {render}'
+    if render != "beads" and scene.frames < 2:
+        yield "frames", f"an animation of {render} has 2 or more, not {scene.frames}"
     if render in CARRIED:
         if coarse is None or coarse.kind not in CARRIED[render]:
             yield "coarse" if coarse is None else "coarse.kind", f'of {render} is one of {", ".join(CARRIED[render])}'

@@ -97,6 +97,7 @@ MOVED = GRID + np.arange(6.0)[:, None, None] * [0.1, 0.0]
     (TRACKS, wide(MOVED * 0), "tiny.toml: exemplar: its elements are all in one place"),
     (TRACKS, "", "a.csv: exemplar.file: is empty"),
     (TRACKS, "not what it says", "a.csv: exemplar.file: "),
+    (THREADS, threads(samples=3), "tiny.toml: exemplar.file: threads of 3 samples; it takes 4 or more"),
     # good tracks that the scene is not for
     (TRACKS, threads(), 'tiny.toml: render.kind: "beads" draws points; the elements of a.csv are threads'),
     (SHEETS, threads(), 'tiny.toml: render.kind: "papers" draws sheets; the elements of a.csv are threads'),
@@ -232,6 +233,10 @@ def test_a_gust_tosses_square_sheets(home: Path, capsys: pytest.CaptureFixture[s
     Path("a.csv").write_text(sheets(columns=3))
     line = refused(SHEETS.replace("FILE", "a.csv"), capsys, ("exemplar.npz",))
     assert line == 'tiny.toml: coarse.kind: "gust" tosses square sheets; those of the exemplar are 4 × 3'
+    Path("a.csv").write_text(sheets())
+    shutil.rmtree("out")
+    line = refused(changed(SHEETS.replace("FILE", "a.csv"), "count = 4", "count = 9000"), capsys, ("exemplar.npz",))
+    assert line.startswith("tiny.toml: elements.count: 1 to 5000 scraps")
 
 
 @pytest.mark.parametrize(("text", "content", "grid"), [

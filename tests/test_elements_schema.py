@@ -141,6 +141,9 @@ ROUND = 'domain = { kind = "ball", centre = CENTRE, radius = 0.3 }'
     (BEADS, '["result"]', '["result"]\nframe = 4', "figure.frame: the animation has 3 frames"),
     (FISH, '["result"]', '["coarse"]', 'figure.panels: there is no "coarse" without a [coarse]'),
     (BEADS, '["result"]', '["result"]\nlabels = ["a", "b"]', "figure.labels: 2 labels for 1 panels"),
+    (FISH, "frames = 3", "frames = 1", "frames: an animation of shoal has 2 or more, not 1"),
+    (BEADS, "frames = 3", "frames = 3\nfps = 0.5", "fps: should be greater than or equal to 1, not 0.5"),
+    (BEADS, "iterations = 2", "neighborhood = 0.5", "synthesis.neighborhood: should be greater than or equal to 1"),
     # places
     (BEADS, "spacing = 0.12", "pins = [{ at = [0.0, 0.5, 0.0] }]",
      "elements.pins[0].at: has 3 coordinates; elements.size is 32×32"),
