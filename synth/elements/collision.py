@@ -10,7 +10,7 @@ from synth.elements.neighborhood import wrapped
 from synth.elements.search import difference
 
 ROUNDS = 20  # of pushing apart, at most
-THREAD_ROUNDS = 16
+THREAD_ROUNDS = 24
 BETWEEN = 5  # balls of a thread from one sample to the next
 CALM = 1.0  # frames
 SLACK = 0.02  # of the radii, by which elements are pushed farther apart than needed: else many would still touch

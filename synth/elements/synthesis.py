@@ -39,7 +39,7 @@ class Settings:
     inertia     weight of where a sample is carried from the frame before, frame by frame, in terms of what its
                 neighbours say
     control     weight of the control map's difference in the search
-    hybrid      resolve collisions after each assignment
+    hybrid      resolve collisions: of points after each assignment, of threads at the end
     """
 
     iterations: int = 8
@@ -188,16 +188,18 @@ class Optimizer:
     def correct(self, active: np.ndarray) -> None:
         """The extra solver step, and the hard constraints."""
         dims = self.positions.shape[3]
-        threads = self.elements.topology == "thread"
-        if self.settings.hybrid and threads:
-            self.positions[active] = collision.parted(self.positions[active], self.elements.size, self.elements.grid)
         for t in active:
             points = self.positions[t].reshape(-1, dims)
-            if self.settings.hybrid and not threads:
+            if self.settings.hybrid and self.elements.topology == "none":
                 points = collision.resolved(points, self.radius, self.element, self.guides.period)
             self.positions[t] = self.guides.constraints.enforced(points).reshape(self.positions[t].shape)
         self.positions.reshape(-1, dims)[self._pinned()] = (
             self.guides.constraints.pins.position if self.guides.constraints.pins else np.zeros((0, dims)))
+
+    def finish(self) -> None:
+        """Part threads that pass through each other: once, for all frames, since it costs as much as a few iterations."""
+        if self.settings.hybrid and self.elements.topology == "thread":
+            self.positions = collision.parted(self.positions, self.elements.size, self.elements.grid)
 
     def result(self) -> Elements:
         """The output as it stands."""
@@ -221,7 +223,7 @@ class Optimizer:
 
 def together(within: Exemplar, start: Elements, source: np.ndarray, guides: Guides, settings: Settings,
              kept: Mapping[str, np.ndarray] | None = None) -> Iterator[Optimizer]:
-    """All frames together, non-causal: the optimizer after each iteration; its `result` after the last.
+    """All frames together, non-causal: the optimizer after each iteration; its `result` when there are no more.
 
     kept   the `state` of an interrupted run after some iteration, which comes first then
     """
@@ -235,6 +237,7 @@ def together(within: Exemplar, start: Elements, source: np.ndarray, guides: Guid
     while len(optimizer.energies) < settings.iterations and not _is_settled(optimizer):
         optimizer.iterate(every, start.frames)
         yield optimizer
+    optimizer.finish()
 
 
 def _is_settled(optimizer: Optimizer) -> bool:
