@@ -197,7 +197,7 @@ class Optimizer:
             self.guides.constraints.pins.position if self.guides.constraints.pins else np.zeros((0, dims)))
 
     def finish(self) -> None:
-        """Part threads that pass through each other: once, for all frames, since it costs as much as a few iterations."""
+        """Part threads that pass through each other: once, since it costs as much as a few iterations."""
         if self.settings.hybrid and self.elements.topology == "thread":
             self.positions = collision.parted(self.positions, self.elements.size, self.elements.grid)
 
