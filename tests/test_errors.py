@@ -6,7 +6,15 @@ from pathlib import Path
 import pytest
 
 from pipeline import errors
-from pipeline.errors import BadInput, EnvironmentMissing, FlowloomError, StorageFailed, Terminated
+from pipeline.errors import (
+    BadInput,
+    EnvironmentMissing,
+    FlowloomError,
+    StorageFailed,
+    Terminated,
+    WrongValue,
+    blaming,
+)
 
 
 @pytest.mark.parametrize(("error", "code", "line"), [
@@ -44,3 +52,15 @@ def test_termination_passes_whoever_catches_every_exception() -> None:
         finally:
             closed.append("closed")
     assert closed == ["closed"]
+
+
+def test_the_innermost_key_is_to_blame_and_what_names_a_file_stays_as_it_is() -> None:
+    with pytest.raises(WrongValue, match="too large") as caught, blaming("outer"), blaming("outer.inner"):
+        raise ValueError("too large")
+    assert caught.value.key == "outer.inner"
+    bad = BadInput("a.csv", "file", "is empty")
+    with pytest.raises(BadInput) as passed, blaming("outer"):
+        raise bad
+    assert passed.value is bad
+    with pytest.raises(TypeError), blaming("outer"):
+        raise TypeError("a fault of ours")

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from test_cli import SCENE
+from test_elements_schema import TRACKS
 
 from pipeline import stages
 from pipeline.listing import project_scenes
@@ -99,3 +100,19 @@ def test_every_key_that_a_product_reads_is_one_that_scenes_have() -> None:
                 known.add(key)
     assert read
     assert not read - known
+
+
+def test_a_folder_counts_with_each_of_its_files(tmp_path: Path) -> None:
+    (tmp_path / "shoal").mkdir()
+    for frame in (1, 2):
+        (tmp_path / "shoal" / f"{frame}.ply").write_text(f"frame {frame}")
+    (tmp_path / "tiny.toml").write_text(TRACKS.replace("FILE", "shoal"))
+    tracked, reads = load(tmp_path / "tiny.toml").variants[""], product("exemplar")
+    before = reads.tables(tracked)
+    assert reads.reads_files(tracked)
+    (tmp_path / "shoal" / "2.ply").write_text("frame two")
+    assert reads.tables(tracked) != before
+    (tmp_path / "shoal" / "2.ply").write_text("frame 2")
+    assert reads.tables(tracked) == before
+    (tmp_path / "shoal" / "3.ply").write_text("frame 3")
+    assert reads.tables(tracked) != before

@@ -170,6 +170,8 @@ def long_table(grid: tuple[int, ...], positions: np.ndarray) -> str:
 def test_a_long_table_holds_points_threads_and_sheets(tmp_path: Path, grid: tuple[int, ...]) -> None:
     (tmp_path / "a.csv").write_text(long_table(grid, some(grid).positions))
     found = tracks.read_foreign(tmp_path / "a.csv", "key", rate=25)
+    assert tracks.read_foreign(tmp_path / "a.csv", "key", otherwise=12).rate == 12
+    assert tracks.read_foreign(tmp_path / "a.csv", "key", rate=25, otherwise=12).rate == 25
     assert found.grid == grid and found.rate == 25 and np.array_equal(found.positions, some(grid).positions)
 
 
@@ -341,7 +343,7 @@ def test_sequences_are_whole(tmp_path: Path, names: list[str], what: str, reason
 
 def test_curves_from_a_usd_file_with_its_rate(tmp_path: Path) -> None:
     stage.write(tmp_path / "a.usdc", some((5,)))
-    found = tracks.read_foreign(tmp_path / "a.usdc", "key")
+    found = tracks.read_foreign(tmp_path / "a.usdc", "key", otherwise=12)
     assert found.grid == (5,) and found.rate == 30 and np.array_equal(found.positions, some((5,)).positions)
     with pytest.raises(BadInput, match=r"a\.usdc: key: holds no prim /nobody"):
         tracks.read_foreign(tmp_path / "a.usdc", "key", prim="/nobody")
