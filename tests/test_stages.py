@@ -13,6 +13,7 @@ from pipeline import manifest, stages
 from pipeline.errors import BadInput
 from pipeline.progress import Progress
 from pipeline.scene import load
+from pipeline.schema import PROJECT_SCENES
 
 SCENE = """\
 title = "A tiny circle"
@@ -319,3 +320,17 @@ def test_seaweed_through_the_whole_chain(tmp_path: Path) -> None:
 
     made(tmp_path, SEAWEED.replace("window = 3", "window = 2"))
     assert remade(root, before) == {"geometry/blades", "images/beauty", "tiny"}
+
+
+@pytest.mark.parametrize("scene", ["ma13-fig01", "ma13-fig08", "ma09-fig04"])
+def test_a_product_comes_after_what_any_variant_makes_it_from(scene: str, tmp_path: Path) -> None:
+    """Variants need not have the same products: some have obstacles, a flow, a coarse motion of threads."""
+    works = stages.Works(load(PROJECT_SCENES / f"{scene}.toml", quick=True), tmp_path)
+    for stage in ("synth", "bake", "render"):
+        order = works._in_order(stage)
+        for made in works.products.values():
+            for product in made.values():
+                if product.stage != stage:
+                    continue
+                before = [other for other, _ in product.inputs if made[other].stage == stage]
+                assert all(order.index(other) < order.index(product.name) for other in before)
