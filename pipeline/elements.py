@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from pipeline import fields, looks, obstacles
-from pipeline.elements_schema import ElementsScene, TracksExemplar, TracksMotion
+from pipeline.elements_schema import MOST, ElementsScene, TracksExemplar, TracksMotion
 from pipeline.errors import WrongValue, blaming
 from pipeline.files import atomic, pictures, tracks
 from pipeline.product import Frames, Product, Stock
@@ -229,6 +229,8 @@ def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
 def _require_room(scene: ElementsScene, region: Any, count: int) -> None:
     """Raise for an output that is over-constrained: more elements than the domain holds, more hard positions than
     elements, or one that lies outside."""
+    if count > MOST:
+        raise WrongValue("elements.spacing", f"{count:,} elements would fill the domain; {MOST:,} are the most")
     room = float((region.inside > 0).sum()) * region.cell**scene.dimension
     # of the densest packing, in the plane or in space
     most = room / ((CROWDED * scene.elements.spacing) ** scene.dimension * (0.866 if scene.dimension == 2 else 0.707))

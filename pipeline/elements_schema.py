@@ -25,6 +25,7 @@ from pipeline.schema import (
     key,
 )
 
+MOST = 100_000  # elements of an output
 Place = Annotated[tuple[Annotated[float, Field(ge=-100, le=100)], ...], Strict(False)]
 
 
@@ -136,7 +137,7 @@ class Elements(Table):
                          0.03, "heights", gt=0, le=1)
     radius: float = key("of a particle of the exemplar's middle size, as drawn and as it collides", 0.42, "spacings",
                         gt=0, le=10)
-    count: int = key("of elements; 0: as dense as the exemplar, of threads and sheets 200", 0, ge=0, le=100000)
+    count: int = key("of elements; 0: as dense as the exemplar, of threads and sheets 200", 0, ge=0, le=MOST)
     domain: Annotated[Obstacle, Field(discriminator="kind")] | None = key(
         "a table with the keys of one of [[obstacles]]: elements stay inside; none: the whole domain", None)
     toroidal: bool = key("along x, what leaves the domain comes in on the other side", False)

@@ -145,6 +145,7 @@ BALL = '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = RADIUS\n[ren
     ("spacing = 0.12", 'spacing = 0.12\ndomain = { kind = "ball", centre = [0.0, 0.5], radius = 0.1 }',
      "synthesis.neighborhood: the domain is smaller than a neighbourhood"),
     ("spacing = 0.12", "spacing = 0.12\ncount = 5000", "elements.count: 5,000 elements are more than the domain holds"),
+    ("spacing = 0.12", "spacing = 0.001", "elements.spacing: 1,154,700 elements would fill the domain; 100,000 are"),
     ("spacing = 0.12", "spacing = 0.12\ncount = 2\npins = [{ at = [0.0, 0.2] }, { at = [0.0, 0.5] }, "
                        "{ at = [0.0, 0.8] }]", "elements.pins: 3 hard positions in frame 1, and 2 elements"),
     ("spacing = 0.12", "spacing = 0.12\ncount = 2\npins = [{ at = [0.0, 0.2], frame = 2 }, { at = [0.0, 0.5], frame = 2"

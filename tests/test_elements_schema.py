@@ -7,6 +7,7 @@ from test_scene import complaint, written
 
 from pipeline.elements_schema import ElementsScene
 from pipeline.scene import load
+from pipeline.schema import PROJECT_SCENES
 
 BEADS = """\
 title = "Beads that turn"
@@ -202,3 +203,11 @@ def test_tracks_may_be_a_folder_whose_files_stay_inside(tmp_path: Path) -> None:
         assert expected in complaint(written(home, TRACKS.replace("FILE", file)))
     (home / "out").symlink_to(tmp_path)
     assert "is a link that leaves the scene's folder" in complaint(written(home, TRACKS.replace("FILE", "out")))
+
+
+def test_the_readmes_example_is_a_whole_scene(tmp_path: Path) -> None:
+    text = (PROJECT_SCENES / "README.md").read_text().split("## Scenes of elements\n")[1]
+    example = [line.removeprefix("    ") for line in text.splitlines() if line.startswith("    ")]
+    scene = load(written(tmp_path, "\n".join(example))).variants[""]
+    assert isinstance(scene, ElementsScene)
+    assert (scene.exemplar.kind, scene.render.kind, scene.flows) == ("hexagonal-grid", "beads", True)
