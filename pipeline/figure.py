@@ -115,6 +115,8 @@ def _label(scene: Scene, panel: panels.Shown) -> str:
     labels = scene.figure.labels
     if labels:
         return labels[panels.shown(scene).index(panel)]
+    if panel.panel == "coarse" and isinstance(scene, ElementsScene) and not scene.flows:
+        return "coarse motion *C*"
     return LABELS[panel.panel] + (f", {panel.view}" if panel.view else "")
 
 
