@@ -11,6 +11,7 @@ In the order data passes through them:
     sources          the code that a product depends on
     obstacles        synth: the solids in the flow
     fields           synth: exemplar, L and H
+    guides           synth: what guides elements: domain, flow, orientation, maps, hard positions
     elements         synth: exemplar, C and the output of a scene of elements
     geometry         bake: F and the density
     looks            bake and render: meshes and pictures of elements

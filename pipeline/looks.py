@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import obstacles
+from pipeline import guides, obstacles
 from pipeline.elements_schema import ElementsScene
 from pipeline.geometry import read_mesh, write_mesh
 from pipeline.panels import read_light, suffix, write_light
@@ -159,10 +159,9 @@ def _ground(scene: ElementsScene, stock: Stock) -> Any:
     """What beads lie on."""
     if scene.render.kind != "beads":
         return None
-    from pipeline.elements import domain
     from render.beads import Ground
 
-    found = domain(scene, stock)
+    found = guides.domain(scene, stock)
     inside = np.argwhere(found.inside > 0)[:, ::-1]
     low, high = found.origin + found.cell * inside.min(axis=0), found.origin + found.cell * inside.max(axis=0)
     plain = scene.elements.domain is None and not scene.obstacles
@@ -221,7 +220,8 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
                 read=read_stage, export=True),
         Product(name="beauty", stage="render", folder="images", suffix=suffix,
                 reads=("render", "seed", "fps", *ground), inputs=(("mesh", "same"), ("elements", "once"), *solid),
-                methods=(f"render.{scene.render.kind}",), make=make_beauty, write=write_light, read=read_light)]
+                methods=(f"render.{scene.render.kind}", "pipeline.guides"), make=make_beauty, write=write_light,
+                read=read_light)]
     look = (f"render.{scene.render.kind}", *shape)
     pictures: dict[str, tuple[Any, tuple[tuple[str, Frames], ...], tuple[str, ...]]] = {
         "exemplar": (make_exemplar_picture, (("exemplar", "once"),), look),

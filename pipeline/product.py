@@ -39,7 +39,7 @@ class Product:
     """One series of files, `name.0001.suffix` …, or the one file `name.suffix`.
 
     reads   dotted keys of the scene that its content depends on; the first is blamed for values that do not do
-    methods modules of synth and render that compute it: their sources, and all these import, count for its key
+    methods modules that compute it, of synth and render mostly: their sources, and all these import, count for its key
     inputs  products it is made from, and which of their frames frame i needs: the "same", all "until" and with
             i, "every" one, or the one file there is ("once")
     make    make(scene, stock, frames): yields (frame, value) for each of `frames` (ascending), in that order

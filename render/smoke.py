@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, denoise, lic, march, sheet, studio
+from render import backend, denoise, lic, march, sheet, studio, surface
 
 # The lit sheet. Lengths are shares of the picture's height, so a scene looks the same at any width.
 THICKNESS = 0.075  # about the size of one motif
@@ -341,14 +341,7 @@ def _studio(mi: Any, bowl: tuple[float, float] | None,
     for name, box in studio.LAMPS.items():
         if name not in lights:
             continue
-        scene[name] = {
-            "type": "rectangle",
-            "to_world": mi.ScalarTransform4f().look_at(
-                origin=list(box.position), target=list(box.target), up=[0, 1, 0]
-            ).scale([0.5 * box.size[0], 0.5 * box.size[1], 1.0]),
-            "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(box.radiance)},
-                        "sampling_weight": box.share},
-        }
+        scene[name] = surface.lamp(mi, box)
     if bowl:
         scene["bowl"] = _mesh(mi, "bowl", studio.bowl(*bowl), studio.BOWL_COLOUR)
     return scene
