@@ -86,3 +86,19 @@ def test_threads_take_the_details_of_whole_threads_in_their_own_frames() -> None
     assert np.abs(away[..., 0]).max() < 1e-5, "no detail along the thread"
     assert np.linalg.norm(away, axis=-1).max() == pytest.approx(0.3, abs=0.01)
     assert found.source.shape == (9 * 7 * 12,) and (found.source.reshape(9, 7, 12) % 12 == np.arange(12)).all()
+
+
+def test_a_control_map_chooses_the_patches() -> None:
+    """An exemplar of small elements on its left and large ones on its right, and a map that asks for the contrary."""
+    points = arrangement.poisson_disk((12, 12), seed=5)
+    large = points.positions[0, :, 0, 0] > 6
+    exemplar = Elements(points.positions, size=1.0 + large, box=points.box)
+
+    def unlike(at: np.ndarray, elements: np.ndarray) -> np.ndarray:
+        return ((at[:, 0] < 0) - large[elements].astype(float)) ** 2
+
+    found = initialize.points(exemplar, disc(), 1, 2.0, 1.0, 1, unlike=unlike)
+    left = found.elements.positions[0, :, 0, 0] < 0
+    assert found.elements.size[left].mean() > 1.8 and found.elements.size[~left].mean() < 1.2
+    plain = initialize.points(exemplar, disc(), 1, 2.0, 1.0, 1).elements
+    assert abs(plain.size[plain.positions[0, :, 0, 0] < 0].mean() - 1.5) < 0.25

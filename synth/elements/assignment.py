@@ -14,8 +14,9 @@ from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import cg
 from threadpoolctl import threadpool_limits
 
+from synth.elements.neighborhood import at_offsets
 from synth.elements.samples import Elements
-from synth.elements.search import Exemplar, Matches, Output, _at_offsets, tied_weight
+from synth.elements.search import Exemplar, Matches, Output, tied_weight
 
 TOLERANCE = 1e-4  # relative residual of the conjugate gradients
 MOST_ITERATIONS = 200
@@ -121,7 +122,7 @@ def _of_tied(within: Exemplar, output: Output, coarse: np.ndarray | None, sample
     Of anchored details p̂ = C(s') + R(s') q(s_i') - C(s) - R(s) q(s_i): details turn with the coarse shape. Else the
     way is turned as a whole.
     """
-    at = _at_offsets(Elements(output.positions, within.elements.grid), within.offsets)[samples]
+    at = at_offsets(Elements(output.positions, within.elements.grid), within.offsets)[samples]
     kappa = tied_weight(within)
     terms = []
     base = np.zeros((1, within.detail.shape[1])) if coarse is None else coarse

@@ -70,6 +70,23 @@ def tied(shape: Shape, grid: tuple[int, ...]) -> np.ndarray:
     return np.array(beside + trail, np.int32).reshape(-1, 3)
 
 
+def at_offsets(elements: Elements, offsets: np.ndarray) -> np.ndarray:
+    """Index of the sample at each offset (F, 3) from each of the M = T·E·S samples, (M, F), -1 where there is none."""
+    frames, count, samples = elements.positions.shape[:3]
+    columns = elements.grid[-1] if elements.grid else 1
+    rows = samples // columns
+    time, _, row, column = np.unravel_index(np.arange(frames * count * samples), (frames, count, rows, columns))
+    dt, dv, du = offsets.T if len(offsets) else np.zeros((3, 0), int)
+    if frames == 1:
+        dt = np.zeros_like(dt)  # an exemplar of one frame stands for all times
+    to = [axis[:, None] + step for axis, step in ((time, dt), (row, dv), (column, du))]
+    inside = np.ones(to[0].shape, bool)
+    for axis, length in zip(to, (frames, rows, columns), strict=True):
+        inside &= (axis >= 0) & (axis < length)
+    step = dt * count * samples + dv * columns + du
+    return np.where(inside, np.arange(len(time))[:, None] + step, -1)
+
+
 def details(elements: Elements, frames: np.ndarray | None) -> np.ndarray:
     """q(s) = R(s)ᵀ (p(s) - C(s)), (T·E·S, D) float32; `frames` (T·E·S, D, D) are the R(s), None: none is turned."""
     moved = elements.positions if elements.coarse is None else elements.positions - elements.coarse

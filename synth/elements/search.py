@@ -85,16 +85,20 @@ def exemplar(elements: Elements, shape: Shape, frames: np.ndarray | None = None,
     falloff = np.where(there, shape.falloff(squared, time), 0).astype(np.float32)
     alone = falloff * np.maximum(0, shape.radius - np.sqrt(squared)) ** 2
     detail = neighborhood.details(elements, frames)
-    at = _at_offsets(elements, offsets)
+    at = neighborhood.at_offsets(elements, offsets)
     tied = np.where((at >= 0)[..., None], detail[np.maximum(at, 0)] - detail[:, None], 0)
-    many = elements.count * (elements.positions.shape[2])
-    per_element = np.zeros(elements.count) if control is None else control
-    spread = lambda values: np.tile(np.repeat(values, many // elements.count), elements.frames)  # noqa: E731
+    controls = np.zeros(elements.count) if control is None else control
     return Exemplar(
         elements, shape, frames, offsets, found, np.where(there[..., None], away, 0).astype(np.float32), falloff,
         alone.astype(np.float32), there.reshape(len(found), -1, shape.most).sum(axis=2).astype(np.int32),
         tied.astype(np.float32), (at >= 0).astype(np.int8), detail.astype(np.float32),
-        spread(per_element).astype(np.float32), spread(1 << (elements.kind % 31)).astype(np.int32))
+        _of_samples(elements, controls).astype(np.float32),
+        _of_samples(elements, 1 << (elements.kind % 31)).astype(np.int32))
+
+
+def _of_samples(elements: Elements, values: np.ndarray) -> np.ndarray:
+    """Values of elements (E,) as values of their samples (T·E·S,)."""
+    return np.tile(np.repeat(values, elements.positions.shape[2]), elements.frames)
 
 
 def found_others(elements: Elements, shape: Shape, active: np.ndarray, period: np.ndarray | None) -> np.ndarray:
@@ -112,23 +116,6 @@ def difference(away: np.ndarray, period: np.ndarray | None) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         turns = np.where(period > 0, np.rint(away / period), 0)
     return (away - turns * period).astype(np.float32)
-
-
-def _at_offsets(elements: Elements, offsets: np.ndarray) -> np.ndarray:
-    """Index of the sample at each offset from each sample, (M, F), -1 where there is none."""
-    frames, count, samples = elements.positions.shape[:3]
-    columns = elements.grid[-1] if elements.grid else 1
-    rows = samples // columns
-    time, _, row, column = np.unravel_index(np.arange(frames * count * samples), (frames, count, rows, columns))
-    dt, dv, du = offsets.T if len(offsets) else np.zeros((3, 0), int)
-    if frames == 1:
-        dt = np.zeros_like(dt)  # an exemplar of one frame stands for all times
-    to = [axis[:, None] + step for axis, step in ((time, dt), (row, dv), (column, du))]
-    inside = np.ones(to[0].shape, bool)
-    for axis, length in zip(to, (frames, rows, columns), strict=True):
-        inside &= (axis >= 0) & (axis < length)
-    step = dt * count * samples + dv * columns + du
-    return np.where(inside, np.arange(len(time))[:, None] + step, -1)
 
 
 @dataclass(frozen=True)
@@ -325,7 +312,7 @@ def nearest_reference(within: Exemplar, output: Output, samples: np.ndarray, nei
     shape = within.shape
     count = output.positions.shape[1] * output.positions.shape[2]
     position = output.positions.reshape(-1, output.positions.shape[3])
-    at = _at_offsets(Elements(output.positions, within.elements.grid), within.offsets)
+    at = neighborhood.at_offsets(Elements(output.positions, within.elements.grid), within.offsets)
     kappa = tied_weight(within)
     blocks = len(shape.times)
     result = (np.full((len(samples), n), -1), np.full((len(samples), n), np.inf),
