@@ -42,6 +42,8 @@ def machine() -> str:
 
 def opencl() -> str:
     """Moves a field by one cell on the device: the kernel that everything else is made of."""
+    if sys.platform == "linux" and not Path("/sys/devices").is_dir():  # in a bare chroot: it would abort, not say so
+        raise EnvironmentMissing("/sys is not mounted, without which PoCL aborts: mount -t sysfs sysfs /sys")
     from synth import advect, opencl
 
     field = np.arange(20, dtype=np.float32).reshape(4, 5)
