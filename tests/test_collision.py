@@ -32,12 +32,41 @@ def test_points_in_one_place_come_apart() -> None:
     assert np.linalg.norm(after[0] - after[1]) > 1.9
 
 
-def test_threads_are_parted_between_their_samples_too() -> None:
-    """Two that cross in the middle of a segment, in a clip in which nothing moves."""
-    one = np.stack([np.linspace(-2, 2, 5), np.zeros(5), np.zeros(5)], axis=-1)
-    other = np.stack([np.full(5, 0.5), np.linspace(-2, 2, 5), np.full(5, 0.05)], axis=-1)
-    clip = np.repeat(np.stack([one, other])[None], 4, axis=0)
-    after = collision.parted(clip, np.full(2, 0.2), (5,))
-    assert after[0, 1, 2, 2] - (after[0, 0, 2, 2] + after[0, 0, 3, 2]) / 2 > 0.36
-    assert np.allclose(after, after[:1]), "what does not move does not come to move"
-    assert np.allclose(after[0, 0, 0], one[0], atol=0.01), "far from the crossing nothing is changed"
+def two_threads(frames: int, apart: float) -> np.ndarray:
+    """Two threads (frames, 2, 9, 3) along x, one over the other in y."""
+    x = np.linspace(-2, 2, 9)
+    one, other = (np.stack([x, np.full(9, y), np.zeros(9)], axis=-1) for y in (0.0, apart))
+    return np.repeat(np.stack([one, other])[None], frames, axis=0)
+
+
+def test_threads_that_want_to_change_places_do_not_pass_through_each_other() -> None:
+    coarse = two_threads(12, 1.0)
+    wanted = coarse.copy()
+    wanted[:, 1, :, 1] -= np.linspace(0, 2, 12)[:, None]  # ends on the other side
+    after = collision.followed(coarse, wanted, np.full(2, 0.3))
+    away = after[:, 1, :, 1] - after[:, 0, :, 1]
+    assert (wanted[-1, 1, :, 1] < wanted[-1, 0, :, 1]).all(), "pushing the last frame apart would leave it so"
+    assert np.linalg.norm(after[:, 1] - after[:, 0], axis=-1).min() > 0.55 and (away > 0).all()
+
+
+def test_threads_that_cross_between_their_samples_are_parted() -> None:
+    coarse = two_threads(3, 1.5)
+    wanted = coarse.copy()
+    turned = np.stack([np.full(9, 0.25), np.linspace(-2, 2, 9), np.full(9, 0.05)], axis=-1)
+    wanted[:, 1] = turned
+    after = collision.followed(coarse, wanted, np.full(2, 0.2))
+    share = np.linspace(0, 1, 21)[:, None]
+    for t in range(3):
+        lines = [(line[:-1, None] * (1 - share) + line[1:, None] * share).reshape(-1, 3) for line in after[t]]
+        assert np.linalg.norm(lines[0][:, None] - lines[1], axis=-1).min() > 0.37
+
+
+def test_threads_that_touch_nothing_go_where_they_are_wanted_and_keep_their_segments_even() -> None:
+    coarse = two_threads(8, 3.0)
+    wanted = coarse + 0.3 * np.sin(np.arange(8) / 3)[:, None, None, None] * np.array([0.0, 1.0, 0.5])
+    after = collision.followed(coarse, wanted, np.full(2, 0.2))
+    assert np.allclose(after, wanted, atol=0.02)
+    uneven = wanted.copy()
+    uneven[:, :, 4, 0] += 0.3  # segments of 0.8 and 0.2
+    lengths = np.linalg.norm(np.diff(collision.followed(coarse, uneven, np.full(2, 0.2)), axis=2), axis=-1)
+    assert np.allclose(lengths, 0.5, atol=0.1)

@@ -1,19 +1,32 @@
-"""Collisions between elements, the extra solver step of the hybrid (ma13 §4.1, figure 5)."""
+"""Collisions between elements, the extra solver step of the hybrid (ma13 §4.1, figure 5).
+
+`resolved` pushes points apart, frame by frame. Threads that have passed through each other cannot be parted that way:
+one frame says to the left and the next to the right. `followed` moves them from frame to frame instead, in steps so
+small that none can pass.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from synth.elements.neighborhood import wrapped
 from synth.elements.search import difference
 
 ROUNDS = 20  # of pushing apart, at most
-THREAD_ROUNDS = 24
-BETWEEN = 5  # balls of a thread from one sample to the next
-CALM = 1.0  # frames
 SLACK = 0.02  # of the radii, by which elements are pushed farther apart than needed: else many would still touch
+
+# threads
+BETWEEN = 5  # balls of a thread from one sample to the next
+FIRST_STEPS = 120  # from the coarse threads to the first frame
+STEPS = 8  # from frame to frame
+SETTLE = 4  # rounds of pushing apart in a step
+BOLD = 1.3  # times the push that would do if nothing else pushed
+CLEARANCE = 0.06  # what SLACK is for points
+FIRST_PULL = 0.15  # radii in a step, towards the first frame
+PULL, FASTEST = 0.25, 0.2  # share of the way back that a step pulls a free sample, and the most, radii
+RIDING = 0.5  # share of the coarse motion in that of samples that touch
+LISTED = 0.8  # radii: how much farther away than touching are the balls that a list of neighbours holds
 
 
 def overlaps(points: np.ndarray, radius: np.ndarray, element: np.ndarray, period: np.ndarray | None = None,
@@ -62,38 +75,94 @@ def resolved(points: np.ndarray, radius: np.ndarray, element: np.ndarray, period
     return result
 
 
-def parted(positions: np.ndarray, radius: np.ndarray, grid: tuple[int, ...], calm: float = CALM) -> np.ndarray:
-    """Threads (T, E, S, D) pushed apart until none interpenetrate, or THREAD_ROUNDS are over; radius (E,).
+def followed(coarse: np.ndarray, wanted: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Threads that go where `wanted` says without passing through each other: (T, E, S, D) float64.
 
-    Between samples a thread is a row of BETWEEN balls. What they are pushed by goes to the samples on both sides, and
-    is low-passed over `calm` frames (standard deviation): a push that comes and goes with a frame would be jitter.
+    coarse  (T, E, S, D): threads side by side, which do not interpenetrate; wanted (T, E, S, D); radius (E,)
+    The first frame grows out of the coarse threads, and each frame out of the one before: position-based dynamics
+    [Müller et al. 2007], whose constraints are contacts and the lengths of segments, those of the coarse threads.
+    What touches moves partly as the coarse threads do, which keep their places in the bundle; what is free is pulled
+    to where it is wanted, so that it comes back after a contact.
     """
-    result = positions.astype(np.float64)
-    frames, count, samples = positions.shape[:3]
-    share = np.arange(BETWEEN) / BETWEEN
-    balls = np.repeat(radius, (samples - 1) * BETWEEN)
-    element = np.repeat(np.arange(count), (samples - 1) * BETWEEN)
-    for _ in range(THREAD_ROUNDS):
-        push = np.zeros_like(result)
-        touched = 0
-        for t in range(frames):
-            line = result[t]
-            points = line[:, :-1, None] * (1 - share)[:, None] + line[:, 1:, None] * share[:, None]
-            flat = points.reshape(-1, positions.shape[3])
-            one, other, depth = overlaps(flat, balls * (1 + SLACK), element)
-            touched += len(one)
-            by, hits = _pushed(flat, one, other, depth)
-            by = by.reshape(count, samples - 1, BETWEEN, -1)
-            given = np.zeros((count, samples, positions.shape[3]))
-            weight = np.full((count, samples, 1), 1e-9)
+    frames = len(wanted)
+    coarse, wanted = coarse.astype(np.float64), wanted.astype(np.float64)
+    threads = _Threads(coarse[0], radius, np.linalg.norm(np.diff(coarse, axis=2), axis=-1, keepdims=True).mean(axis=0))
+    for step in range(1, FIRST_STEPS + 1):
+        threads.pulled(coarse[0] + (wanted[0] - coarse[0]) * step / FIRST_STEPS, 1.0, FIRST_PULL)
+        threads.settle()
+    result = np.empty_like(wanted)
+    result[0] = threads.positions
+    for t in range(1, frames):
+        there, bundle = (wanted[t] - wanted[t - 1]) / STEPS, (coarse[t] - coarse[t - 1]) / STEPS
+        for step in range(1, STEPS + 1):
+            threads.positions += np.where(threads.touching, RIDING * bundle + (1 - RIDING) * there, there)
+            threads.pulled(wanted[t - 1] + step * there, PULL, FASTEST)
+            threads.settle()
+        result[t] = threads.positions
+    return result
+
+
+class _Threads:
+    """Threads (E, S, D) as they are pushed; `touching` (E, S, 1) bool says which samples have been in the last round.
+
+    Between samples a thread is a row of BETWEEN balls.
+    """
+
+    def __init__(self, positions: np.ndarray, radius: np.ndarray, lengths: np.ndarray) -> None:
+        count, samples = positions.shape[:2]
+        self.positions = positions.copy()
+        self.touching = np.zeros((count, samples, 1), bool)
+        self.lengths = lengths
+        self.thick = float(radius.mean())
+        self.element = np.repeat(np.arange(count), (samples - 1) * BETWEEN)
+        self.radius = radius[self.element] * (1 + CLEARANCE)
+        self.pairs = np.zeros((0, 2), np.intp)
+        self.listed: np.ndarray | None = None  # where the balls were when `pairs` was made
+
+    def pulled(self, target: np.ndarray, share: float, most: float) -> None:
+        """Move free samples to `target` by a share of the way, at most by `most` radii."""
+        way = np.where(self.touching, 0.0, target - self.positions)
+        length = np.linalg.norm(way, axis=-1, keepdims=True)
+        self.positions += way * np.minimum(share, most * self.thick / np.maximum(length, 1e-12))
+
+    def settle(self) -> None:
+        """Bring segments back to their lengths and push threads apart."""
+        for _ in range(2):
+            segment = np.diff(self.positions, axis=1)
+            length = np.linalg.norm(segment, axis=-1, keepdims=True)
+            change = 0.25 * (1 - self.lengths / np.maximum(length, 1e-12)) * segment
+            self.positions[:, :-1] += change
+            self.positions[:, 1:] -= change
+        for _ in range(SETTLE):
+            if not self._push_apart():
+                break
+
+    def _push_apart(self) -> bool:
+        """One round: what balls are pushed by goes to the samples on both sides. Whether any touch."""
+        count, samples, dims = self.positions.shape
+        share = (np.arange(BETWEEN) / BETWEEN)[:, None]
+        balls = (self.positions[:, :-1, None] * (1 - share) + self.positions[:, 1:, None] * share).reshape(-1, dims)
+        one, other = self._near(balls).T
+        away = balls[other] - balls[one]
+        depth = self.radius[one] + self.radius[other] - np.sqrt(np.einsum("nd,nd->n", away, away))
+        deep = depth > 0
+        given, weight = np.zeros_like(self.positions), np.zeros((count, samples, 1))
+        if deep.any():
+            by, hits = _pushed(balls, one[deep], other[deep], BOLD * depth[deep])
+            by = by.reshape(count, samples - 1, BETWEEN, dims)
             hit = (hits > 0).reshape(count, samples - 1, BETWEEN, 1)
             for at, part in ((slice(0, -1), 1 - share), (slice(1, None), share)):
-                given[:, at] += (by * part[:, None]).sum(axis=2)
-                weight[:, at] += (hit * part[:, None]).sum(axis=2)
-            push[t] = given / np.maximum(weight, 0.5)
-        if not touched:
-            break
-        if frames > 1:
-            push = ndimage.gaussian_filter1d(push, calm, axis=0, mode="nearest")
-        result += push
-    return result
+                given[:, at] += (by * part).sum(axis=2)
+                weight[:, at] += (hit * part).sum(axis=2)
+        self.positions += given / np.maximum(weight, 0.5)
+        self.touching = weight > 0
+        return bool(deep.any())
+
+    def _near(self, balls: np.ndarray) -> np.ndarray:
+        """Pairs (P, 2) of balls of different threads that may touch: listed anew when a ball has come far enough."""
+        margin = LISTED * self.thick
+        if self.listed is None or 2 * np.sqrt(((balls - self.listed) ** 2).sum(axis=-1).max()) > margin:
+            pairs = cKDTree(balls).query_pairs(2 * float(self.radius.max()) + margin, output_type="ndarray")
+            self.pairs = pairs[self.element[pairs[:, 0]] != self.element[pairs[:, 1]]]
+            self.listed = balls
+        return self.pairs

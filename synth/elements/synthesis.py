@@ -197,9 +197,10 @@ class Optimizer:
             self.guides.constraints.pins.position if self.guides.constraints.pins else np.zeros((0, dims)))
 
     def finish(self) -> None:
-        """Part threads that pass through each other: once, since it costs as much as a few iterations."""
+        """Keep threads from passing through each other: once, since it costs as much as a few iterations."""
         if self.settings.hybrid and self.elements.topology == "thread":
-            self.positions = collision.parted(self.positions, self.elements.size, self.elements.grid)
+            assert self.elements.coarse is not None
+            self.positions = collision.followed(self.elements.coarse, self.positions, self.elements.size)
 
     def result(self) -> Elements:
         """The output as it stands."""
