@@ -29,6 +29,7 @@ BEVEL = 0.012
 SHEET = 0.006  # thickness of the domain's paper, which lies on the paper beyond
 FINE = 2  # relief vertices per pixel, along each axis; at most MOST
 MOST = 1100
+TILE = 16  # cells
 BOUNCES = 2
 
 
@@ -111,10 +112,35 @@ def _ground(mi: Any, ground: Ground, height: int, scale: float, middle: np.ndarr
     away, hole = _distances(ground, x, y)
     z, colour = relief(away * scale, hole)
     points = np.stack([(x - middle[0]) * scale, (y - middle[1]) * scale, z], -1).reshape(-1, 3)
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    faces = np.stack([corner, corner + 1, corner + columns + 1, corner, corner + columns + 1, corner + columns], 1)
-    return surface.shape(mi, "ground", points, faces.reshape(-1, 3), colour.reshape(-1, 3), {
+    used, faces = np.unique(tiled(z, colour), return_inverse=True)
+    points, colour, faces = points[used], colour.reshape(-1, 3)[used], faces.reshape(-1, 3)
+    return surface.shape(mi, "ground", points, faces, colour, {
         "type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}})
+
+
+def tiled(z: np.ndarray, colour: np.ndarray) -> np.ndarray:
+    """Triangles (M, 3) of a relief, of heights (Y, X) and colours (Y, X, 3), as indices of its vertices row by row.
+
+    Two for each cell, and two for each tile of TILE × TILE cells that is level, of one colour and next to none that is
+    not: few places of the paper need more, and a tree over millions of triangles takes longer than the picture.
+    """
+    rows, columns = np.array(z.shape) - 1
+    of_vertex = np.concatenate([z[..., None], colour], axis=-1)
+    same_row = (np.diff(of_vertex, axis=0) == 0).all(axis=-1)
+    same_column = (np.diff(of_vertex, axis=1) == 0).all(axis=-1)
+    level = same_row[:, :-1] & same_row[:, 1:] & same_column[:-1] & same_column[1:]
+    level = ndimage.minimum_filter(level, 3, mode="nearest")
+    tiles = rows // TILE, columns // TILE
+    whole = level[: tiles[0] * TILE, : tiles[1] * TILE].reshape(tiles[0], TILE, tiles[1], TILE).all(axis=(1, 3))
+    fine = np.ones((rows, columns), bool)
+    fine[: tiles[0] * TILE, : tiles[1] * TILE] = ~whole.repeat(TILE, axis=0).repeat(TILE, axis=1)
+    found = []
+    for (y, x), edge in ((np.nonzero(fine), 1), (np.array(np.nonzero(whole)) * TILE, TILE)):
+        corner = y * (columns + 1) + x
+        right, up = edge, edge * (columns + 1)
+        found += [np.stack([corner, corner + right, corner + up + right], 1),
+                  np.stack([corner, corner + up + right, corner + up], 1)]
+    return np.concatenate(found)
 
 
 def _distances(ground: Ground, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

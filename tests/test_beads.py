@@ -55,3 +55,16 @@ def test_a_picture_shows_the_obstacle_dark_on_white() -> None:
     seen = beads.picture(np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros((0, 3)), ground(DISC_WITH_HOLE), SMALL)
     assert seen[22:26, 30:34].mean() < 0.3 * seen[22:26, 48:52].mean()
     assert seen[0, 0].mean() < 0.8 * seen[22:26, 48:52].mean()
+
+
+def test_level_paper_is_tiled_coarsely_and_nothing_is_left_out() -> None:
+    rows, columns = 70, 99
+    y, x = np.mgrid[:rows, :columns]
+    z = np.where(np.hypot(x - 70, y - 30) < 9, 0.03, 0.0)
+    faces = beads.tiled(z, np.where(z[..., None] > 0, 0.1, np.ones(3)))
+    a, b, c = (np.stack([x.ravel()[faces[:, k]], y.ravel()[faces[:, k]]], 1) for k in range(3))
+    area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    assert (area > 0).all() and area.sum() == (rows - 1) * (columns - 1)
+    assert len(faces) < 0.6 * 2 * (rows - 1) * (columns - 1)
+    high = z.ravel()[faces]
+    assert (area[high.max(axis=1) > 0] == 0.5).all() and (area[high.min(axis=1) != high.max(axis=1)] == 0.5).all()
