@@ -165,7 +165,8 @@ class Synthesis(Table):
     search: Literal["exact", "k-coherence"] = key("exhaustive, or k-coherence", "k-coherence")
     assignment: Literal["sparse", "local"] = key(
         "all positions at once, or each by its neighbours as constants (§4.1, Parallelization)", "sparse")
-    hybrid: bool = key("resolve collisions (figure 5): of points after each assignment, threads do not pass through each other", False)
+    hybrid: bool = key("resolve collisions (figure 5): of points after each assignment; threads never pass "
+                       "through each other", False)
     hold: float = key("weight of the coarse place of threads and sheets", 0.3, ge=0, le=100)
 
 

@@ -16,7 +16,7 @@ from typing import Any
 from pipeline import elements, fields, geometry, manifest, obstacles, panels, sources
 from pipeline.errors import BadInput, StorageFailed, WrongValue
 from pipeline.manifest import Entry, Folder
-from pipeline.product import Product, Scene
+from pipeline.product import Product, Scene, Stock
 from pipeline.progress import Progress
 from pipeline.scene import Scenes, folder_name
 from pipeline.schema import Scene as MotionScene
@@ -115,6 +115,10 @@ class Works:
             chain.append(manifest.digest([chain[-1], entry.sha256]))
         return chain[frame]
 
+    def stock(self, variant: str, name: str) -> Stock:
+        """What the product may read."""
+        return _Stock(self, variant, self.products[variant][name])
+
     def missing(self, variant: str, name: str, frames: Iterable[int]) -> list[int]:
         """Those of `frames` that are not whole."""
         return [frame for frame in frames if not self.entry(variant, name, frame)]
@@ -191,7 +195,7 @@ class Works:
                     if product.check:
                         product.check(scene)
                     else:
-                        next(product.make(scene, _Stock(self, variant, product), missing[:1]))
+                        next(product.make(scene, self.stock(variant, name), missing[:1]))
 
     @contextmanager
     def _blaming(self, product: Product) -> Iterator[None]:
@@ -217,7 +221,7 @@ class Works:
             return
         label = f"{product.stage} {name}" + (f" ({variant})" if len(self.makers(name)) > 1 else "")
         folder = self.folder(variant, name)
-        stock = _Stock(self, variant, product)
+        stock = self.stock(variant, name)
         with self._blaming(product), progress.task(label, len(wanted), len(wanted) - len(missing)) as advance:
             for frame, value in product.make(scene, stock, missing):
                 file = self.file(variant, name, frame)

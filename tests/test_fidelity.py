@@ -44,3 +44,11 @@ def test_apart_and_jitter() -> None:
     even = np.arange(5.0)[:, None, None, None] * np.ones((1, 2, 1, 2))
     assert fidelity.jitter(even) == 0
     assert fidelity.jitter(even**2) == pytest.approx(8.0)
+
+
+def test_a_unit_smaller_than_the_radii_that_are_asked_repeats_as_often_as_it_takes() -> None:
+    """A hexagonal grid of 4 by 4 is the same grid as one of 12 by 12."""
+    small, large = (fidelity.statistics(grid.positions, 0.95, grid.box[1] - grid.box[0])
+                    for grid in (arrangement.hexagonal_grid((4, 4)), arrangement.hexagonal_grid((12, 12))))
+    assert fidelity.apart(large.correlation, small.correlation) < 0.02
+    assert small.nearest == pytest.approx(large.nearest, rel=1e-4)

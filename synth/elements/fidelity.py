@@ -12,6 +12,8 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from synth.elements.neighborhood import wrapped
+
 BINS = 24  # of the pair correlation, up to REACH
 REACH = 3.0  # nearest distances
 SMOOTH = 0.75  # bins, by which it is smoothed: small exemplars have few pairs
@@ -38,7 +40,7 @@ def statistics(positions: np.ndarray, spacing: float, period: np.ndarray | None 
     """Of an exemplar or an output.
 
     spacing  the exemplar's nearest distance, by which radii are measured
-    period   (D,) where it repeats along all axes
+    period   (D,) of what repeats, 0 along axes that end
     depth    of points (M, D) in their domain; those nearer to its border than REACH are not asked for their
              neighbours, so that the border does not count as emptiness. None: all are
     carried  like positions: how far a global flow has carried each, which is not its own motion
@@ -47,14 +49,14 @@ def statistics(positions: np.ndarray, spacing: float, period: np.ndarray | None 
     reach = REACH * spacing
     counts, asked, nearest, density = np.zeros(BINS), 0, [], []
     for t in np.unique(np.linspace(0, len(points) - 1, FRAMES).astype(int)):
-        now = points[t] if period is None else np.mod(points[t], period)
-        tree = cKDTree(now, boxsize=period)
+        now = wrapped(points[t], period)
+        tree = cKDTree(_repeated(now, period, reach))
         inner = np.arange(len(now)) if depth is None else np.flatnonzero(depth(now) > reach)
         if not len(inner):
             continue
         distance = tree.query(now[inner], k=2)[0][:, 1]
         nearest.append(distance)
-        pairs = tree.sparse_distance_matrix(cKDTree(now[inner], boxsize=period), reach, output_type="coo_matrix")
+        pairs = tree.sparse_distance_matrix(cKDTree(now[inner]), reach, output_type="coo_matrix")
         apart = pairs.data[pairs.data > 0]
         counts += np.histogram(apart, bins=BINS, range=(0, reach))[0]
         density.append(len(apart) / len(inner))
@@ -68,6 +70,17 @@ def statistics(positions: np.ndarray, spacing: float, period: np.ndarray | None 
     correlation = counts / asked / shell * reach ** points.shape[2] / max(float(np.mean(density)), 1e-9)
     return Statistics(correlation, spectrum(positions if carried is None else positions - carried),
                       float(np.mean(np.concatenate(nearest))))
+
+
+def _repeated(points: np.ndarray, period: np.ndarray | None, reach: float) -> np.ndarray:
+    """The points (M, D) of the one unit, and their copies all round as far as `reach`, which may be many units."""
+    for axis in np.flatnonzero(period) if period is not None else ():
+        unit = float(period[axis])  # type: ignore[index]
+        many = int(np.ceil(reach / unit))
+        along = np.eye(points.shape[1])[axis] * unit
+        points = np.concatenate([points + n * along for n in range(-many, many + 1)])
+        points = points[(points[:, axis] >= -reach) & (points[:, axis] <= unit + reach)]
+    return points
 
 
 def spectrum(positions: np.ndarray) -> np.ndarray:

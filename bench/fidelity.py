@@ -1,0 +1,108 @@
+"""Fidelity of every scene of elements: how far the output's statistics are off those of its exemplar (ma13).
+
+`python -m bench.fidelity` synthesizes what is not up to date in out/ and prints one JSON object. Of points the
+statistics are asked in the depth of the domain; of threads the neighbours are asked at their middles, of sheets on
+each sheet, and the motion of both is that of their details, without the coarse motion.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline import guides, scene, stages
+from pipeline.elements_schema import ElementsScene
+from pipeline.progress import Progress
+from synth.elements import decomposition, fidelity
+from synth.elements.neighborhood import spacing
+from synth.elements.samples import Elements
+
+OUT = Path("out")
+SHEETS = 12  # of an output, whose samples are asked for their neighbours
+
+
+def measured(name: str, variant: str, example: Elements, output: Elements, depth: Callable[[np.ndarray], np.ndarray],
+             period: np.ndarray | None, carried: np.ndarray | None) -> dict[str, Any]:
+    """One row: how far three statistics are off, and the output's jitter over the exemplar's."""
+    own = None if example.box is None else (example.box[1] - example.box[0]).astype(np.float64)
+    if example.topology == "none":
+        unit = spacing(example.positions, own)
+        given = fidelity.statistics(example.positions, unit, own)
+        found = fidelity.statistics(output.positions, unit, period, depth, carried)
+    else:
+        of_elements = of_threads if example.topology == "thread" else of_sheets
+        given, found = of_elements(example), of_elements(output)
+    moves = len(given.spectrum) > 0
+    return {"scene": name, "variant": variant, "elements": output.count,
+            "pair correlation": round(fidelity.apart(given.correlation, found.correlation), 3),
+            "motion spectrum": round(fidelity.apart(given.spectrum, found.spectrum), 3) if moves else None,
+            "nearest distance": round(abs(found.nearest / given.nearest - 1), 3),
+            "jitter over the exemplar's": round(fidelity.jitter(output.positions)
+                                                / fidelity.jitter(example.positions), 2) if moves else None}
+
+
+def of_threads(elements: Elements) -> fidelity.Statistics:
+    """Threads by their middles; the motion of their samples' details."""
+    middle = elements.positions[:, :, elements.grid[0] // 2, None]
+    found = fidelity.statistics(middle, spacing(elements.positions))
+    return fidelity.Statistics(found.correlation, detail_spectrum(elements), found.nearest)
+
+
+def of_sheets(elements: Elements) -> fidelity.Statistics:
+    """The samples of each of a few sheets by themselves; the motion of their details."""
+    chosen = np.unique(np.linspace(0, elements.count - 1, SHEETS).astype(int))
+    rows, columns = elements.grid
+    surface = elements.positions.reshape(elements.frames, elements.count, rows, columns, 3)
+    edge = float(np.linalg.norm(np.diff(surface, axis=3), axis=-1).mean())
+    each = [fidelity.statistics(elements.positions[:, e, :, None], edge) for e in chosen]
+    return fidelity.Statistics(np.mean([one.correlation for one in each], axis=0), detail_spectrum(elements),
+                               float(np.mean([one.nearest for one in each])))
+
+
+def detail_spectrum(elements: Elements) -> np.ndarray:
+    """The spectrum of what samples do beside the coarse motion."""
+    detailed = elements if elements.coarse is not None else decomposition.with_coarse(elements)
+    assert detailed.coarse is not None
+    moved = detailed.positions - detailed.coarse
+    return fidelity.spectrum(moved.reshape(len(moved), -1, 1, moved.shape[3]))
+
+
+def rows_of(file: Path) -> list[dict[str, Any]]:
+    """All variants of a scene file; none if it is not a scene of elements."""
+    scenes = scene.load(file)
+    if not all(isinstance(one, ElementsScene) for one in scenes.variants.values()):
+        return []
+    stages.run("synth", scenes, OUT, Progress(quiet=True))
+    works = stages.Works(scenes, OUT)
+    found = []
+    for variant, one in scenes.variants.items():
+        assert isinstance(one, ElementsScene)
+        stock = works.stock(variant, "elements")
+        example, output = stock.read("exemplar"), stock.read("elements")
+        if example.topology == "none":
+            region = guides.domain(one, stock)
+            flow = guides.flow(one, stock, region)
+            found.append(measured(scenes.name, variant, example, output, region.distance, guides.toroidal(one),
+                                  None if flow is None else carried(flow, output.positions)))
+        else:
+            found.append(measured(scenes.name, variant, example, output, np.zeros, None, None))
+    return found
+
+
+def carried(flow: Callable[[int, np.ndarray], np.ndarray], positions: np.ndarray) -> np.ndarray:
+    """How far the flow has carried each sample, frame by frame, like positions (T, E, 1, D)."""
+    steps = [flow(t, before[:, 0].astype(np.float64))[:, None] for t, before in enumerate(positions[:-1])]
+    return np.concatenate([np.zeros((1, *positions.shape[1:])), np.cumsum(steps, axis=0)])
+
+
+def main() -> None:
+    rows = [row for file in sorted(Path("scenes").glob("ma13-*.toml")) for row in rows_of(file)]
+    print(json.dumps({"fidelity of scenes": rows}, indent=1, ensure_ascii=False))
+
+
+if __name__ == "__main__":
+    main()
