@@ -149,7 +149,7 @@ ROWS: dict[str, Callable[[dict[str, Any]], Iterable[Row]]] = {
     "solid": solid_rows, "potential": potential_rows, "lagrangian": lagrangian_rows, "boundary": boundary_rows,
     "smoke": smoke_rows, "elements": elements_rows}
 # lists of equal rows each: printed as tables of their own
-TABLES = ("quality", "solid", "potential", "lagrangian", "boundary", "elements")
+TABLES = ("quality", "solid", "potential", "lagrangian", "boundary", "elements", "fidelity")
 PARTS = tuple(dict.fromkeys((*ROWS, *TABLES)))
 
 

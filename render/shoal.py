@@ -16,10 +16,9 @@ import numpy as np
 from render import backend, film, studio, surface, water
 
 CAMERA = studio.Camera(position=(1.92, 0.34, 0.72), target=(0.0, 0.47, 0.0), fov=30.0)
-WATER = water.Water(extinction=(0.52, 0.27, 0.22), above=(0.022, 0.190, 0.300), below=(0.002, 0.026, 0.056),
-                    turn=(0.42, 1.3), zenith=(0.50, 1.00, 1.12), dim=(0.020, 0.085, 0.115), shafts=0.75)
-PALETTE = ((0.640, 0.735, 0.775), (0.560, 0.690, 0.745), (0.730, 0.760, 0.740), (0.930, 0.660, 0.240))
-"""Flanks, sRGB: silver, blue silver, pale silver, and amber for the few that differ."""
+WATER = water.Water(extinction=(0.52, 0.27, 0.22), above=(0.018, 0.155, 0.250), below=(0.001, 0.020, 0.047),
+                    turn=(0.42, 1.3), zenith=(0.50, 1.00, 1.12), dim=(0.020, 0.085, 0.115), shafts=0.75,
+                    lamp=(10.0, 7.2, 5.8))
 
 
 @dataclass(frozen=True)

@@ -35,9 +35,11 @@ class Water:
     zenith: Colour = (0.16, 0.62, 0.70)  # light from straight above
     dim: Colour = (0.010, 0.060, 0.075)  # light on what is not seen to be lit, among what is near
     shafts: float = 0.55  # contrast of the sun's shafts in it
+    lamp: Colour = (0.0, 0.0, 0.0)  # irradiance from the eye's own lamp, as divers have them, where there is no water
 
 
 FARTHEST = 40.0
+LAMP_RISE = 0.35  # of the lamp over the eye, in distances to what it lights: too little for shadows to be seen
 SHAFT_BLUR = 6.0  # pixels of the caustics
 SHAFT_STEPS = 2  # places along each ray where it is asked whether a shaft passes
 
@@ -161,6 +163,10 @@ def through_water(mi: Any, sunlight: np.ndarray, look: Water) -> Any:
             hit = active & first.is_valid()
             bsdf = first.bsdf(ray)
             light = self.sun(scene, sampler, first, bsdf, hit)
+            if any(look.lamp):
+                way = dr.normalize(mi.Vector3f(0, LAMP_RISE, 0) - ray.d)
+                lit = mi.Color3f(np.array(look.lamp)) * dr.exp(-extinction * first.t)
+                light += lit * bsdf.eval(mi.BSDFContext(), first, first.to_local(way), hit)
             chosen, share = bsdf.sample(mi.BSDFContext(), first, sampler.next_1d(hit), sampler.next_2d(hit), hit)
             second = scene.ray_intersect(first.spawn_ray(first.to_world(chosen.wo)), hit)
             found = hit & second.is_valid()

@@ -1,6 +1,9 @@
 """A shoal: the picture repeats, fish are seen, and the far ones fade."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from render import shoal
 from synth.elements import mesh
@@ -29,3 +32,14 @@ def test_a_picture_repeats_and_the_distance_fades() -> None:
     upper = np.s_[:20]  # no sand
     assert np.abs(first - water)[upper].mean() > 1.5 * np.abs(second - water)[upper].mean()
     assert np.abs(first - water)[upper].max() > 0.1
+
+
+def test_the_lamp_lights_what_is_near_the_eye_and_not_the_water(monkeypatch: pytest.MonkeyPatch) -> None:
+    near, gone = fish(0.6), fish(-50.0)
+    lit = shoal.picture(near.vertices, near.faces, near.colours, SMALL)
+    water = shoal.picture(gone.vertices, gone.faces, gone.colours, SMALL)
+    monkeypatch.setattr(shoal, "WATER", replace(shoal.WATER, lamp=(0.0, 0.0, 0.0)))
+    unlit = shoal.picture(near.vertices, near.faces, near.colours, SMALL)
+    upper = np.s_[:18]  # no sand
+    assert np.array_equal(water[upper], shoal.picture(gone.vertices, gone.faces, gone.colours, SMALL)[upper])
+    assert (lit >= unlit - 1e-6).all() and (lit - unlit)[upper].max() > 0.3
