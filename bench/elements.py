@@ -70,18 +70,15 @@ def turning(edge: float) -> synthesis.Flow:
 def converged(within: search.Exemplar, start: initialize.Copied, guides: Guides, settings: Settings) -> dict[str, Any]:
     """Times and energies until the energy stays."""
     energies: list[float] = []
-    positions = start.elements.positions
 
     def run() -> np.ndarray:
-        found = positions
         for optimizer in synthesis.together(within, start.elements, start.source, guides,
                                             replace(settings, iterations=MOST)):
             energies.append(optimizer.energies[-1])
             if len(energies) > 1 and energies[-2] - energies[-1] < CONVERGED * energies[-2]:
-                found = optimizer.result().positions
+                optimizer.finish()
                 break
-            found = optimizer.result().positions
-        return found
+        return optimizer.result().positions
 
     _, took = timed(run)
     return {**took, "iterations": len(energies), "energies": [round(e, 4) for e in energies],
@@ -99,14 +96,14 @@ def particles(count: int = 1000, frames: int = FRAMES) -> dict[str, Any]:
 
 
 def noodles() -> dict[str, Any]:
-    """200 noodles of 40 samples, 60 frames."""
+    """200 noodles of 40 samples, 60 frames, that do not pass through each other."""
     exemplar = handmade.jagged(frames=FRAMES)
     curve_ = simulation.lifted(FRAMES, length=100.0, thick=8.5)
     coarse = bundle.duplicated(curve_, 200).positions
     inner, outer = orientation.along_threads(exemplar.coarse), orientation.along_threads(coarse)
     within = search.exemplar(exemplar, Shape(3.0, 3, 3), inner)
     start = initialize.on_coarse(exemplar, coarse, inner, outer, 9, 1, 24.0)
-    return converged(within, start, Guides(frames=outer), Settings())
+    return converged(within, start, Guides(frames=outer), Settings(hybrid=True))
 
 
 def sheets() -> dict[str, Any]:
