@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from pipeline import guides, scene, stages
+from pipeline.elements import in_detail
 from pipeline.elements_schema import ElementsScene
 from pipeline.progress import Progress
-from synth.elements import decomposition, fidelity
+from synth.elements import collision, fidelity, orientation
 from synth.elements.neighborhood import spacing
 from synth.elements.samples import Elements
 
@@ -30,10 +31,13 @@ def measured(name: str, variant: str, example: Elements, output: Elements, depth
     """One row: how far three statistics are off, and the output's jitter over the exemplar's."""
     own = None if example.box is None else (example.box[1] - example.box[0]).astype(np.float64)
     if example.topology == "none":
+        moving, like = output.positions, example.positions
         unit = spacing(example.positions, own)
         given = fidelity.statistics(example.positions, unit, own)
         found = fidelity.statistics(output.positions, unit, period, depth, carried)
     else:
+        example = in_detail(example)
+        moving, like = details(output), details(example)
         of_elements = of_threads if example.topology == "thread" else of_sheets
         given, found = of_elements(example), of_elements(output)
     moves = len(given.spectrum) > 0
@@ -41,15 +45,22 @@ def measured(name: str, variant: str, example: Elements, output: Elements, depth
             "pair correlation": round(fidelity.apart(given.correlation, found.correlation), 3),
             "motion spectrum": round(fidelity.apart(given.spectrum, found.spectrum), 3) if moves else None,
             "nearest distance": round(abs(found.nearest / given.nearest - 1), 3),
-            "jitter over the exemplar's": round(fidelity.jitter(output.positions)
-                                                / fidelity.jitter(example.positions), 2) if moves else None}
+            "jitter over the exemplar's": round(fidelity.jitter(moving) / fidelity.jitter(like), 2) if moves else None,
+            "crossing threads a frame": crossed(output) if example.topology == "thread" else None,
+            "in the exemplar": crossed(example) if example.topology == "thread" else None}
+
+
+def crossed(elements: Elements) -> str:
+    """The least and the most pairs of threads that interpenetrate in a frame."""
+    pairs = [collision.crossings(threads, elements.size) for threads in elements.positions.astype(np.float64)]
+    return f"{min(pairs)} to {max(pairs)}"
 
 
 def of_threads(elements: Elements) -> fidelity.Statistics:
     """Threads by their middles; the motion of their samples' details."""
     middle = elements.positions[:, :, elements.grid[0] // 2, None]
     found = fidelity.statistics(middle, spacing(elements.positions))
-    return fidelity.Statistics(found.correlation, detail_spectrum(elements), found.nearest)
+    return fidelity.Statistics(found.correlation, fidelity.spectrum(details(elements)), found.nearest)
 
 
 def of_sheets(elements: Elements) -> fidelity.Statistics:
@@ -59,16 +70,16 @@ def of_sheets(elements: Elements) -> fidelity.Statistics:
     surface = elements.positions.reshape(elements.frames, elements.count, rows, columns, 3)
     edge = float(np.linalg.norm(np.diff(surface, axis=3), axis=-1).mean())
     each = [fidelity.statistics(elements.positions[:, e, :, None], edge) for e in chosen]
-    return fidelity.Statistics(np.mean([one.correlation for one in each], axis=0), detail_spectrum(elements),
+    return fidelity.Statistics(np.mean([one.correlation for one in each], axis=0), fidelity.spectrum(details(elements)),
                                float(np.mean([one.nearest for one in each])))
 
 
-def detail_spectrum(elements: Elements) -> np.ndarray:
-    """The spectrum of what samples do beside the coarse motion."""
-    detailed = elements if elements.coarse is not None else decomposition.with_coarse(elements)
-    assert detailed.coarse is not None
-    moved = detailed.positions - detailed.coarse
-    return fidelity.spectrum(moved.reshape(len(moved), -1, 1, moved.shape[3]))
+def details(elements: Elements) -> np.ndarray:
+    """What samples do beside the coarse motion, in their local frames: (T, E·S, 1, D)."""
+    assert elements.coarse is not None
+    frames = orientation.along(elements.coarse, elements.grid)
+    moved = (elements.positions - elements.coarse).reshape(-1, 3)
+    return np.einsum("nji,nj->ni", frames, moved).reshape(elements.frames, -1, 1, 3)
 
 
 def rows_of(file: Path) -> list[dict[str, Any]]:

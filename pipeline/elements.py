@@ -226,27 +226,28 @@ def _of_points(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
 
 def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[Any, Any, Any]:
     """The exemplar for the search, the first guess and the guides of threads or sheets on coarse positions."""
-    from synth.elements import decomposition, initialize, orientation, search
+    from synth.elements import initialize, orientation, search
     from synth.elements.constraints import Constraints
     from synth.elements.synthesis import Guides
 
-    example = _decomposed(example)
-    assert example.coarse is not None
-    if example.topology == "thread":
-        example = decomposition.following(example, round(FOLLOWED * example.frames), round(FOLLOWED * example.grid[0]))
+    example = in_detail(example)
     coarse = stock.read("coarse").positions
-
-    def frames_of(positions: np.ndarray) -> np.ndarray:
-        if example.topology == "thread":
-            return orientation.along_threads(positions)
-        return orientation.on_sheets(positions, example.grid)
-
     assert example.coarse is not None
-    inner, outer = frames_of(example.coarse), frames_of(coarse)
+    inner, outer = (orientation.along(positions, example.grid) for positions in (example.coarse, coarse))
     within = search.exemplar(example, _shape(scene, example), inner)
     neighbours = NEIGHBOURS if example.topology == "thread" else 1
     start = initialize.on_coarse(example, coarse, inner, outer, neighbours, scene.seed, scene.fps)
     return within, start, Guides(Constraints(), frames=outer)
+
+
+def in_detail(example: Elements) -> Elements:
+    """An exemplar with the C that its details are told from: of threads, one that follows what they do slowly."""
+    from synth.elements import decomposition
+
+    example = _decomposed(example)
+    if example.topology == "thread":
+        return decomposition.following(example, round(FOLLOWED * example.frames), round(FOLLOWED * example.grid[0]))
+    return example
 
 
 def _decomposed(example: Elements) -> Elements:

@@ -102,6 +102,21 @@ def followed(coarse: np.ndarray, wanted: np.ndarray, radius: np.ndarray) -> np.n
     return result
 
 
+def crossings(threads: np.ndarray, radius: np.ndarray, deep: float = 0.02) -> int:
+    """How many pairs of threads (E, S, D) of radius (E,) interpenetrate by more than a share `deep` of a diameter."""
+    element = np.repeat(np.arange(len(threads)), (threads.shape[1] - 1) * BETWEEN)
+    one, other, depth = overlaps(_balls(threads), radius[element], element)
+    through = depth > deep * 2 * radius.mean()
+    return len({tuple(sorted(pair)) for pair in zip(element[one[through]], element[other[through]], strict=True)})
+
+
+def _balls(threads: np.ndarray) -> np.ndarray:
+    """Threads (E, S, D) as rows of balls, BETWEEN from one sample to the next: their middles (E·(S - 1)·BETWEEN, D)."""
+    share = (np.arange(BETWEEN) / BETWEEN)[:, None]
+    balls: np.ndarray = threads[:, :-1, None] * (1 - share) + threads[:, 1:, None] * share
+    return balls.reshape(-1, threads.shape[2])
+
+
 class _Threads:
     """Threads (E, S, D) as they are pushed; `touching` (E, S, 1) bool says which samples have been in the last round.
 
@@ -141,7 +156,7 @@ class _Threads:
         """One round: what balls are pushed by goes to the samples on both sides. Whether any touch."""
         count, samples, dims = self.positions.shape
         share = (np.arange(BETWEEN) / BETWEEN)[:, None]
-        balls = (self.positions[:, :-1, None] * (1 - share) + self.positions[:, 1:, None] * share).reshape(-1, dims)
+        balls = _balls(self.positions)
         one, other = self._near(balls).T
         away = balls[other] - balls[one]
         depth = self.radius[one] + self.radius[other] - np.sqrt(np.einsum("nd,nd->n", away, away))

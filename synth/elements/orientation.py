@@ -42,6 +42,11 @@ def on_sheets(coarse: np.ndarray, grid: tuple[int, ...]) -> np.ndarray:
     return np.stack([right, up, np.cross(right, up)], axis=-1).reshape(-1, 3, 3).astype(np.float32)
 
 
+def along(coarse: np.ndarray, grid: tuple[int, ...]) -> np.ndarray:
+    """Frames (T·E·S, 3, 3) float32 of threads, or of sheets, by their grid, at the coarse positions (T, E, S, 3)."""
+    return along_threads(coarse) if len(grid) == 1 else on_sheets(coarse, grid)
+
+
 def along_directions(direction: np.ndarray) -> np.ndarray:
     """Frames (N, D, D) float32 whose first column is `direction` (N, D); zero directions leave the axes.
 
