@@ -99,7 +99,10 @@ def make_stage(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterato
 
 
 def write_stage(file: Path, elements: Elements, scene: ElementsScene) -> None:
-    """Write the animation: points and curves as such, fish as meshes, sheets as shells with their thickness."""
+    """Write the animation: points and curves as such, fish as meshes, sheets as shells with their thickness.
+
+    Fish bend, and Blender (4.2) shows the first frame of instances in all: so they are meshes, not instances.
+    """
     from pipeline.files import stage
     from synth.elements import mesh
 
