@@ -7,6 +7,7 @@ parallel variant, in which the neighbours are taken as constants and each sample
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -205,10 +206,14 @@ def solved(positions: np.ndarray, terms: Predictions, anchors: Anchors, free: np
     coupling = csr_matrix((weight[both], (to[both], of[both])), (unknowns, unknowns))
     matrix = diags(diagonal) - coupling - coupling.T
     result = base.copy()
-    with threadpool_limits(1):  # sums of a BLAS depend on how many threads share them
-        for d in range(dims):
-            step, _ = cg(matrix, right[:, d], rtol=TOLERANCE, maxiter=MOST_ITERATIONS, M=diags(1.0 / diagonal))
-            result[free, d] += step
+
+    def step(d: int) -> np.ndarray:
+        found: np.ndarray = cg(matrix, right[:, d], rtol=TOLERANCE, maxiter=MOST_ITERATIONS, M=diags(1.0 / diagonal))[0]
+        return found
+
+    # sums of a BLAS depend on how many threads share them; the dimensions share nothing
+    with threadpool_limits(1), ThreadPoolExecutor(dims) as pool:
+        result[free] += np.stack(list(pool.map(step, range(dims))), axis=-1)
     return result
 
 

@@ -11,6 +11,8 @@ of positions in the local frame of s.
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +20,7 @@ from scipy.spatial import cKDTree
 
 from synth.elements.samples import Elements
 
+THREADS = min(8, os.cpu_count() or 1)  # each has a frame's neighbours in memory
 NEAREST_QUANTILE = 0.1  # of the distances to the nearest sample: what the spacing of an exemplar is called
 
 
@@ -127,17 +130,21 @@ def others(positions: np.ndarray, shape: Shape, active: np.ndarray, period: np.n
     frames, count, samples, dims = positions.shape
     size = count * samples
     found = np.full((len(active), size, len(shape.times), shape.most), -1, np.int32)
-    trees = {}
-    for n, frame in enumerate(active):
+    centres = {int(t): positions[t].reshape(-1, dims) for frame in active for t in frame + np.array(shape.times)
+               if 0 <= t < frames}
+
+    def look(n: int) -> None:
         for b, time in enumerate(shape.times):
-            other = int(frame) + time
-            if not 0 <= other < frames:
-                continue
-            if other not in trees:
-                trees[other] = _tree(positions[other].reshape(-1, dims), period)
-            centre = wrapped(positions[frame].reshape(-1, dims), period)
-            found[n, :, b] = _within(trees[other], centre, shape.radius * stretch, shape.most, samples, size)
-            found[n, :, b][found[n, :, b] >= 0] += other * size
+            other = int(active[n]) + time
+            if other in trees:
+                centre = wrapped(centres[int(active[n])], period)
+                found[n, :, b] = _within(trees[other], centre, shape.radius * stretch, shape.most, samples, size)
+                found[n, :, b][found[n, :, b] >= 0] += other * size
+
+    # frames share nothing, so that any number of threads finds the same
+    with ThreadPoolExecutor(THREADS) as pool:
+        trees = dict(zip(centres, pool.map(lambda points: _tree(points, period), centres.values()), strict=True))
+        list(pool.map(look, range(len(active))))
     return found.reshape(-1, len(shape.times) * shape.most)
 
 
