@@ -7,6 +7,7 @@ parallel variant, in which the neighbours are taken as constants and each sample
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import cg
 from threadpoolctl import threadpool_limits
 
-from synth.elements.neighborhood import at_offsets
+from synth.elements.neighborhood import THREADS, at_offsets
 from synth.elements.samples import Elements
 from synth.elements.search import Exemplar, Matches, Output, tied_weight
 
@@ -73,8 +74,12 @@ def predictions(within: Exemplar, output: Output, coarse: np.ndarray | None, mat
     samples = (active[:, None] * size + np.arange(size)).ravel()
     found = matches.sample[samples]
     omega = match_weights(matches.apart[samples])
-    terms = [_of_others(within, output, matches, samples, found, omega)]
-    terms += _of_tied(within, output, coarse, samples, found, omega)
+    # in order, so that any number of threads says the same
+    with ThreadPoolExecutor(THREADS) as pool:
+        terms = list(pool.map(
+            lambda part: _of_others(within, output, matches, samples[part], found[part], omega[part]),
+            np.array_split(np.arange(len(samples)), THREADS)))
+        terms += pool.map(_of_tied(within, output, coarse, samples, found, omega), _near(within.offsets))
     return Predictions(np.concatenate([t.to for t in terms]), np.concatenate([t.of for t in terms]),
                        np.concatenate([t.way for t in terms]).reshape(-1, dims),
                        np.concatenate([t.weight for t in terms]))
@@ -117,17 +122,16 @@ def _with_shift(output: Output, of: np.ndarray, to: np.ndarray, way: np.ndarray,
 
 
 def _of_tied(within: Exemplar, output: Output, coarse: np.ndarray | None, samples: np.ndarray, found: np.ndarray,
-             omega: np.ndarray) -> list[Predictions]:
-    """Of the samples tied by topology and time.
+             omega: np.ndarray) -> Callable[[int], Predictions]:
+    """Of the samples tied by topology and time, those at the f-th offset.
 
     Of anchored details p̂ = C(s') + R(s') q(s_i') - C(s) - R(s) q(s_i): details turn with the coarse shape. Else the
     way is turned as a whole.
     """
     at = at_offsets(Elements(output.positions, within.elements.grid), within.offsets)[samples]
     kappa = tied_weight(within)
-    terms = []
-    base = np.zeros((1, within.detail.shape[1])) if coarse is None else coarse
-    for f in _near(within.offsets):
+
+    def of_offset(f: int) -> Predictions:
         to = at[:, f]
         row = np.nonzero((to >= 0) & (to < output.known * _size(output)))[0]
         way, total = np.zeros((len(row), within.detail.shape[1])), np.zeros(len(row))
@@ -150,9 +154,10 @@ def _of_tied(within: Exemplar, output: Output, coarse: np.ndarray | None, sample
         row = row[good]
         away = way[good] / total[good][:, None]
         if coarse is not None:
-            away = away + base[to[row]] - base[samples[row]]
-        terms.append(Predictions(to[row], samples[row], away, np.full(len(row), float(kappa[f]))))
-    return terms
+            away = away + coarse[to[row]] - coarse[samples[row]]
+        return Predictions(to[row], samples[row], away, np.full(len(row), float(kappa[f])))
+
+    return of_offset
 
 
 def _size(output: Output) -> int:
@@ -187,31 +192,30 @@ def solved(positions: np.ndarray, terms: Predictions, anchors: Anchors, free: np
     to, of = variable[terms.to], variable[terms.of]
     weight = np.where((to >= 0) | (of >= 0), terms.weight, 0.0)
     base = positions.astype(np.float64)
-    # solved for the step from where the samples are: what does not move is then zero
-    residual = terms.way - (base[terms.to] - base[terms.of])
-    diagonal = np.full(unknowns, STAY)
-    right = np.zeros((unknowns, dims))
-    for variables, sign in ((to, 1.0), (of, -1.0)):
-        known = variables >= 0
-        diagonal += np.bincount(variables[known], weight[known], unknowns)
-        for d in range(dims):
-            right[:, d] += np.bincount(variables[known], sign * weight[known] * residual[known, d], unknowns)
+    sides = [(side, side >= 0, sign) for side, sign in ((to, 1.0), (of, -1.0))]
     held = variable[anchors.sample]
-    known = held >= 0
-    diagonal += np.bincount(held[known], anchors.weight[known], unknowns)
-    for d in range(dims):
-        pull = anchors.weight * (anchors.target[:, d] - base[anchors.sample, d])
-        right[:, d] += np.bincount(held[known], pull[known], unknowns)
+    anchored = held >= 0
+    diagonal = np.full(unknowns, STAY)
+    for side, known, _ in sides:
+        diagonal += np.bincount(side[known], weight[known], unknowns)
+    diagonal += np.bincount(held[anchored], anchors.weight[anchored], unknowns)
     both = (to >= 0) & (of >= 0)
     coupling = csr_matrix((weight[both], (to[both], of[both])), (unknowns, unknowns))
     matrix = diags(diagonal) - coupling - coupling.T
-    result = base.copy()
 
     def step(d: int) -> np.ndarray:
-        found: np.ndarray = cg(matrix, right[:, d], rtol=TOLERANCE, maxiter=MOST_ITERATIONS, M=diags(1.0 / diagonal))[0]
+        """Along one axis, from where the samples are: of what does not move it is then zero."""
+        residual = terms.way[:, d] - (base[terms.to, d] - base[terms.of, d])
+        right = np.zeros(unknowns)
+        for side, known, sign in sides:
+            right += np.bincount(side[known], sign * weight[known] * residual[known], unknowns)
+        pull = anchors.weight * (anchors.target[:, d] - base[anchors.sample, d])
+        right += np.bincount(held[anchored], pull[anchored], unknowns)
+        found: np.ndarray = cg(matrix, right, rtol=TOLERANCE, maxiter=MOST_ITERATIONS, M=diags(1.0 / diagonal))[0]
         return found
 
-    # sums of a BLAS depend on how many threads share them; the dimensions share nothing
+    result = base.copy()
+    # sums of a BLAS depend on how many threads share them; the axes share nothing
     with threadpool_limits(1), ThreadPoolExecutor(dims) as pool:
         result[free] += np.stack(list(pool.map(step, range(dims))), axis=-1)
     return result
