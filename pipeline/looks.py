@@ -24,16 +24,16 @@ MARGIN = 0.02  # of a height round the domain that beads lie in
 
 def mesh_of(scene: ElementsScene, elements: Elements, frame: int) -> Mesh:
     """The elements of a frame, from 0, as one mesh, world units."""
-    from synth.elements import mesh
+    from synth.elements import fish, mesh
 
     match scene.render.kind:
         case "beads":
             return mesh.solids(_in_domain(scene, elements.positions[frame, :, 0]), elements.size,
                                _bead_colours(scene, elements))
         case "shoal":
-            gait = mesh.swimming(swum(scene, elements), elements.size, elements.rate, scene.seed)
-            return mesh.fish(elements.positions[frame, :, 0], gait.heading[frame], elements.size, elements.colour,
-                             gait.phase[frame], gait.turn[frame])
+            gait = fish.swimming(swum(scene, elements), elements.size, elements.rate, scene.seed)
+            return fish.bodies(elements.positions[frame, :, 0], gait.heading[frame], elements.size, elements.colour,
+                               gait.phase[frame], gait.turn[frame])
         case "noodles":
             return mesh.tubes(elements.positions[frame], elements.size, elements.colour)
     rows, columns = elements.grid
@@ -106,14 +106,14 @@ def write_stage(file: Path, elements: Elements, scene: ElementsScene) -> None:
     from pipeline.files import stage
     from synth.elements import mesh
 
-    def fish(frame: int) -> dict[str, Any]:
+    def shoal(frame: int) -> dict[str, Any]:
         return {"fish": mesh_of(scene, elements, frame - 1)}
 
     def sheets(frame: int) -> dict[str, Any]:
         surface = elements.positions[frame - 1].reshape(elements.count, *elements.grid, 3)
         return {"sheets": mesh.shells(surface, elements.size, _paper_colours(scene, elements))}
 
-    stage.write(file, elements, {"shoal": fish, "papers": sheets}.get(scene.render.kind))
+    stage.write(file, elements, {"shoal": shoal, "papers": sheets}.get(scene.render.kind))
 
 
 def read_stage(file: Path, scene: ElementsScene) -> bytes:
@@ -212,7 +212,7 @@ def make_coarse_picture(scene: ElementsScene, stock: Stock, frames: list[int]) -
 def products(scene: ElementsScene) -> tuple[Product, ...]:
     """The meshes, the USD file, and the pictures that the figure shows."""
     solid = obstacles.inputs(scene)
-    shape = ("synth.elements.mesh",)
+    shape = ("synth.elements.fish" if scene.render.kind == "shoal" else "synth.elements.mesh",)
     mesh_keys = ("render.kind", "render.colour", "render.speed", "elements.spacing", "seed")
     ground = ("elements.domain", "elements.size", "elements.toroidal")
     made = [

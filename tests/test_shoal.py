@@ -6,27 +6,28 @@ import numpy as np
 import pytest
 
 from render import shoal
-from synth.elements import mesh
+from synth.elements import fish
+from synth.elements.mesh import Mesh
 
 SMALL = shoal.Settings(width=64, height=36, spp=4)
 
 
-def fish(distance: float, count: int = 5) -> mesh.Mesh:
+def shown(distance: float, count: int = 5) -> Mesh:
     """Large fish abreast, at a share of the way from the eye to what it looks at, and beyond."""
     eye, target = np.array(shoal.CAMERA.position), np.array(shoal.CAMERA.target)
     middle = eye + distance * (target - eye)
     spread = np.linspace(-0.2, 0.2, count)[:, None] * [0.0, distance, 0.0]
     ahead = np.cross(target - eye, [0.0, 1.0, 0.0])
-    return mesh.fish(middle + spread, np.tile(ahead, (count, 1)), np.full(count, 0.35 * distance),
-                     np.full((count, 3), 0.9), np.zeros(count), np.zeros(count))
+    return fish.bodies(middle + spread, np.tile(ahead, (count, 1)), np.full(count, 0.35 * distance),
+                       np.full((count, 3), 0.9), np.zeros(count), np.zeros(count))
 
 
 def test_a_picture_repeats_and_the_distance_fades() -> None:
-    near, far = fish(0.6), fish(3.0)
+    near, far = shown(0.6), shown(3.0)
     first = shoal.picture(near.vertices, near.faces, near.colours, SMALL)
     assert first.shape == (36, 64, 3) and np.isfinite(first).all() and first.min() >= 0
     assert np.array_equal(first, shoal.picture(near.vertices, near.faces, near.colours, SMALL))
-    gone = fish(-50.0)
+    gone = shown(-50.0)
     water = shoal.picture(gone.vertices, gone.faces, gone.colours, SMALL)
     second = shoal.picture(far.vertices, far.faces, far.colours, SMALL)
     upper = np.s_[:20]  # no sand
@@ -35,7 +36,7 @@ def test_a_picture_repeats_and_the_distance_fades() -> None:
 
 
 def test_the_lamp_lights_what_is_near_the_eye_and_not_the_water(monkeypatch: pytest.MonkeyPatch) -> None:
-    near, gone = fish(0.6), fish(-50.0)
+    near, gone = shown(0.6), shown(-50.0)
     lit = shoal.picture(near.vertices, near.faces, near.colours, SMALL)
     water = shoal.picture(gone.vertices, gone.faces, gone.colours, SMALL)
     monkeypatch.setattr(shoal, "WATER", replace(shoal.WATER, lamp=(0.0, 0.0, 0.0)))

@@ -30,5 +30,6 @@ The modules, in the order data passes through them:
     collision      the extra solver step
     synthesis      all of it, all frames together or frame by frame
     fidelity       how like its exemplar an output is
-    mesh           surfaces of elements
+    mesh           surfaces of threads, sheets and particles
+    fish           how fish swim, and their surfaces
 """
