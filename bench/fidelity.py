@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 from pipeline import guides, scene, stages
 from pipeline.elements import in_detail
 from pipeline.elements_schema import ElementsScene
+from pipeline.product import Stock
 from pipeline.progress import Progress
 from synth.elements import collision, fidelity, orientation
 from synth.elements.neighborhood import spacing
@@ -26,28 +28,39 @@ OUT = Path("out")
 SHEETS = 12  # of an output, whose samples are asked for their neighbours
 
 
-def measured(name: str, variant: str, example: Elements, output: Elements, depth: Callable[[np.ndarray], np.ndarray],
-             period: np.ndarray | None, carried: np.ndarray | None) -> dict[str, Any]:
-    """One row: how far three statistics are off, and the output's jitter over the exemplar's."""
-    own = None if example.box is None else (example.box[1] - example.box[0]).astype(np.float64)
-    if example.topology == "none":
-        moving, like = output.positions, example.positions
-        unit = spacing(example.positions, own)
-        given = fidelity.statistics(example.positions, unit, own)
-        found = fidelity.statistics(output.positions, unit, period, depth, carried)
-    else:
-        example = in_detail(example)
-        moving, like = details(output), details(example)
-        of_elements = of_threads if example.topology == "thread" else of_sheets
-        given, found = of_elements(example), of_elements(output)
-    moves = len(given.spectrum) > 0
-    return {"scene": name, "variant": variant, "elements": output.count,
-            "pair correlation": round(fidelity.apart(given.correlation, found.correlation), 3),
-            "motion spectrum": round(fidelity.apart(given.spectrum, found.spectrum), 3) if moves else None,
-            "nearest distance": round(abs(found.nearest / given.nearest - 1), 3),
-            "jitter over the exemplar's": round(fidelity.jitter(moving) / fidelity.jitter(like), 2) if moves else None,
-            "crossing threads a frame": crossed(output) if example.topology == "thread" else None,
-            "in the exemplar": crossed(example) if example.topology == "thread" else None}
+@dataclass(frozen=True)
+class Seen:
+    """What is compared of an exemplar or an output: statistics, and the motion (T, E·S, 1, D) that is its own."""
+
+    statistics: fidelity.Statistics
+    motion: np.ndarray
+
+
+def row(example: Elements, output: Elements, given: Seen, found: Seen) -> dict[str, Any]:
+    """How far three statistics are off, and the output's jitter over the exemplar's; threads that cross."""
+    moves = len(given.statistics.spectrum) > 0
+    threads = example.topology == "thread"
+    return {"elements": output.count,
+            "pair correlation": round(fidelity.apart(given.statistics.correlation, found.statistics.correlation), 3),
+            "motion spectrum": round(fidelity.apart(given.statistics.spectrum, found.statistics.spectrum), 3)
+            if moves else None,
+            "nearest distance": round(abs(found.statistics.nearest / given.statistics.nearest - 1), 3),
+            "jitter over the exemplar's": round(fidelity.jitter(found.motion) / fidelity.jitter(given.motion), 2)
+            if moves else None,
+            "crossing threads a frame": crossed(output) if threads else None,
+            "in the exemplar": crossed(example) if threads else None}
+
+
+def of_points(one: ElementsScene, stock: Stock, example: Elements, output: Elements) -> tuple[Seen, Seen]:
+    """Points of an exemplar that repeats, or not, and of an output in its domain and flow."""
+    period = None if example.box is None else (example.box[1] - example.box[0]).astype(np.float64)
+    unit = spacing(example.positions, period)
+    region = guides.domain(one, stock)
+    flow = guides.flow(one, stock, region)
+    moved = None if flow is None else carried(flow, output.positions)
+    found = fidelity.statistics(output.positions, unit, guides.toroidal(one), region.distance, moved)
+    return (Seen(fidelity.statistics(example.positions, unit, period), example.positions),
+            Seen(found, output.positions))
 
 
 def crossed(elements: Elements) -> str:
@@ -56,22 +69,23 @@ def crossed(elements: Elements) -> str:
     return f"{min(pairs)} to {max(pairs)}"
 
 
-def of_threads(elements: Elements) -> fidelity.Statistics:
+def of_threads(elements: Elements) -> Seen:
     """Threads by their middles; the motion of their samples' details."""
     middle = elements.positions[:, :, elements.grid[0] // 2, None]
-    found = fidelity.statistics(middle, spacing(elements.positions))
-    return fidelity.Statistics(found.correlation, fidelity.spectrum(details(elements)), found.nearest)
+    found, motion = fidelity.statistics(middle, spacing(elements.positions)), details(elements)
+    return Seen(fidelity.Statistics(found.correlation, fidelity.spectrum(motion), found.nearest), motion)
 
 
-def of_sheets(elements: Elements) -> fidelity.Statistics:
+def of_sheets(elements: Elements) -> Seen:
     """The samples of each of a few sheets by themselves; the motion of their details."""
     chosen = np.unique(np.linspace(0, elements.count - 1, SHEETS).astype(int))
     rows, columns = elements.grid
     surface = elements.positions.reshape(elements.frames, elements.count, rows, columns, 3)
     edge = float(np.linalg.norm(np.diff(surface, axis=3), axis=-1).mean())
     each = [fidelity.statistics(elements.positions[:, e, :, None], edge) for e in chosen]
-    return fidelity.Statistics(np.mean([one.correlation for one in each], axis=0), fidelity.spectrum(details(elements)),
-                               float(np.mean([one.nearest for one in each])))
+    motion = details(elements)
+    return Seen(fidelity.Statistics(np.mean([one.correlation for one in each], axis=0), fidelity.spectrum(motion),
+                                    float(np.mean([one.nearest for one in each]))), motion)
 
 
 def details(elements: Elements) -> np.ndarray:
@@ -95,12 +109,11 @@ def rows_of(file: Path) -> list[dict[str, Any]]:
         stock = works.stock(variant, "elements")
         example, output = stock.read("exemplar"), stock.read("elements")
         if example.topology == "none":
-            region = guides.domain(one, stock)
-            flow = guides.flow(one, stock, region)
-            found.append(measured(scenes.name, variant, example, output, region.distance, guides.toroidal(one),
-                                  None if flow is None else carried(flow, output.positions)))
+            given, seen = of_points(one, stock, example, output)
         else:
-            found.append(measured(scenes.name, variant, example, output, np.zeros, None, None))
+            example = in_detail(example)
+            given, seen = map(of_threads if example.topology == "thread" else of_sheets, (example, output))
+        found.append({"scene": scenes.name, "variant": variant, **row(example, output, given, seen)})
     return found
 
 
