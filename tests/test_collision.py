@@ -1,6 +1,7 @@
 """Collisions: which elements interpenetrate, and pushing them apart."""
 
 import numpy as np
+import pytest
 
 from synth.elements import collision
 
@@ -39,10 +40,12 @@ def two_threads(frames: int, apart: float) -> np.ndarray:
     return np.repeat(np.stack([one, other])[None], frames, axis=0)
 
 
-def test_threads_that_want_to_change_places_do_not_pass_through_each_other() -> None:
-    coarse = two_threads(12, 1.0)
+@pytest.mark.parametrize(("frames", "way"), [(12, 2.0), (2, 8.0)])
+def test_threads_that_want_to_change_places_do_not_pass_through_each_other(frames: int, way: float) -> None:
+    """Slowly, and as fast as 26 radii from one frame to the next."""
+    coarse = two_threads(frames, 1.0)
     wanted = coarse.copy()
-    wanted[:, 1, :, 1] -= np.linspace(0, 2, 12)[:, None]  # ends on the other side
+    wanted[:, 1, :, 1] -= np.linspace(0, way, frames)[:, None]  # ends on the other side
     after = collision.followed(coarse, wanted, np.full(2, 0.3))
     away = after[:, 1, :, 1] - after[:, 0, :, 1]
     assert (wanted[-1, 1, :, 1] < wanted[-1, 0, :, 1]).all(), "pushing the last frame apart would leave it so"

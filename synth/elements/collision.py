@@ -19,7 +19,9 @@ SLACK = 0.02  # of the radii, by which elements are pushed farther apart than ne
 # threads
 BETWEEN = 5  # balls of a thread from one sample to the next
 FIRST_STEPS = 120  # from the coarse threads to the first frame
-STEPS = 8  # from frame to frame
+STEP = 0.7  # radii that threads go in a step from frame to frame, nearly all of them at most
+NEARLY_ALL = 0.99
+FEWEST = 8  # steps from frame to frame
 SETTLE = 4  # rounds of pushing apart in a step
 BOLD = 1.3  # times the push that would do if nothing else pushed
 CLEARANCE = 0.06  # what SLACK is for points
@@ -93,8 +95,11 @@ def followed(coarse: np.ndarray, wanted: np.ndarray, radius: np.ndarray) -> np.n
     result = np.empty_like(wanted)
     result[0] = threads.positions
     for t in range(1, frames):
-        there, bundle = (wanted[t] - wanted[t - 1]) / STEPS, (coarse[t] - coarse[t - 1]) / STEPS
-        for step in range(1, STEPS + 1):
+        there, bundle = wanted[t] - wanted[t - 1], coarse[t] - coarse[t - 1]
+        way = float(np.quantile(np.linalg.norm(there, axis=-1), NEARLY_ALL))
+        steps = max(FEWEST, int(np.ceil(way / (STEP * threads.thick))))
+        there, bundle = there / steps, bundle / steps
+        for step in range(1, steps + 1):
             threads.positions += np.where(threads.touching, RIDING * bundle + (1 - RIDING) * there, there)
             threads.pulled(wanted[t - 1] + step * there, PULL, FASTEST)
             threads.settle()
