@@ -32,6 +32,7 @@ PLURALS = {"none": "points", "thread": "threads", "sheet": "sheets"}
 SIZES = {"none": 0.8, "thread": 0.38, "sheet": 0.02}
 """Length of a fish, radius of a thread, thickness of a sheet whose file does not say it, spacings."""
 THREAD = 4  # samples or more
+THICKEST = 2.0  # threads that `hybrid` pushes apart, over how far apart they are
 
 
 def make_exemplar(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
@@ -230,6 +231,10 @@ def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
     from synth.elements.constraints import Constraints
     from synth.elements.synthesis import Guides
 
+    thick = 2 * float(example.size.max()) / scene.elements.spacing
+    if scene.synthesis.hybrid and example.topology == "thread" and thick > THICKEST:
+        raise WrongValue("synthesis.hybrid", f"the exemplar's threads are {thick:.1f} times as thick as they are apart, "
+                                             f"and {THICKEST:g} times is the most that can be pushed apart")
     example = in_detail(example)
     coarse = stock.read("coarse").positions
     assert example.coarse is not None

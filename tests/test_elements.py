@@ -4,6 +4,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -249,6 +250,15 @@ def test_threads_and_sheets_of_the_users_are_exemplars(home: Path, text: str, co
     example, output = made(text.replace("FILE", "a.csv"))
     assert example.grid == output.grid == grid and output.count == 4
     assert np.isfinite(output.positions).all()
+
+
+def test_threads_too_thick_to_lie_beside_each_other(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("a.csv").write_text(threads(samples=40))
+    found = tracks.read_foreign(Path("a.csv"), "exemplar.file", dimensions=3)
+    tracks.write(Path("a.npz"), replace(found, size=np.full(found.count, 50.0)))
+    text = changed(THREADS.replace("FILE", "a.npz"), "iterations = 1", "iterations = 1\nhybrid = true")
+    line = refused(text, capsys, ("exemplar.npz", "coarse.npz"))
+    assert line.startswith("tiny.toml: synthesis.hybrid: the exemplar's threads are ")
 
 
 # --- tracks that do
