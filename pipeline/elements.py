@@ -233,7 +233,7 @@ def _on_coarse(scene: ElementsScene, stock: Stock, example: Elements) -> tuple[A
 
     thick = 2 * float(example.size.max()) / scene.elements.spacing
     if scene.synthesis.hybrid and example.topology == "thread" and thick > THICKEST:
-        raise WrongValue("synthesis.hybrid", f"the exemplar's threads are {thick:.1f} times as thick as they are apart, "
+        raise WrongValue("synthesis.hybrid", f"the exemplar's threads are {thick:.1f} times as thick as far apart, "
                                              f"and {THICKEST:g} times is the most that can be pushed apart")
     example = in_detail(example)
     coarse = stock.read("coarse").positions
