@@ -19,7 +19,7 @@ from pipeline.schema import PROJECT_SCENES
 from synth import obstacle, wake
 from synth.motion.detail import Settings, enough_levels, synthesize
 from synth.motion.exemplar import exemplar, from_bitmap
-from synth.motion.frames import local_frame, to_world
+from synth.motion.local_axes import local_frame, to_world
 from synth.motion.quality import measure
 from synth.particles import sampled
 from synth.projection import divergence, project

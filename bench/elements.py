@@ -188,9 +188,9 @@ def own_domains() -> list[dict[str, Any]]:
              "hexagonal grid": (arrangement.hexagonal_grid((10, 10)), 1.75)}
     found = [own_domain(name, exemplar, Shape(radius, sigma=radius**2), 1)
              for name, (exemplar, radius) in still.items()]
-    shoals = {"homogeneous shoal": school.homogeneous(seed=1)[0], "crossing shoal": school.crossing(seed=1)[0],
-              "shoal of two sizes": school.mixed(seed=1)[0]}
-    return found + [own_domain(name, exemplar, Shape(2.0, 5, 4), exemplar.frames) for name, exemplar in shoals.items()]
+    schools = {"homogeneous school": school.homogeneous(seed=1)[0], "crossing school": school.crossing(seed=1)[0],
+              "school of two sizes": school.mixed(seed=1)[0]}
+    return found + [own_domain(name, exemplar, Shape(2.0, 5, 4), exemplar.frames) for name, exemplar in schools.items()]
 
 
 def jitter() -> dict[str, Any]:

@@ -20,7 +20,7 @@ from bench.synthesis import timed
 from synth.motion import detail, lagrangian
 from synth.motion.detail import Settings, enough_levels
 from synth.motion.exemplar import exemplar
-from synth.motion.frames import local_frame
+from synth.motion.local_axes import local_frame
 from synth.motion.quality import measure, whole_motifs
 
 SIZE, OUTPUT, FRAMES = 32, 128, 20

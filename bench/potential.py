@@ -21,7 +21,7 @@ from pipeline.files import pictures
 from synth.motion import detail, potential
 from synth.motion.detail import Settings, enough_levels
 from synth.motion.exemplar import exemplar, from_bitmap
-from synth.motion.frames import local_frame, to_world
+from synth.motion.local_axes import local_frame, to_world
 from synth.motion.quality import measure, whole_motifs
 from synth.projection import divergence
 

@@ -20,7 +20,7 @@ from bench.flows import FLOWS
 from synth.motion import detail, initialize
 from synth.motion.detail import Settings, enough_levels, synthesize
 from synth.motion.exemplar import KINDS, exemplar
-from synth.motion.frames import local_frame
+from synth.motion.local_axes import local_frame
 from synth.motion.quality import measure, whole_motifs
 
 SIZES = (16, 32, 48, 64, 128)

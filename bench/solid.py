@@ -18,7 +18,7 @@ from bench.machine import peak_memory
 from bench.synthesis import timed
 from synth.motion.exemplar import exemplar
 from synth.motion.quality import measure_view
-from synth.motion.solid import Settings, Synthesis, View
+from synth.motion.synthesis_3d import Settings, Synthesis, View
 
 PLANES = {"front": ((1, 0, 0), (0, 1, 0)), "side": ((0, 0, 1), (0, 1, 0)), "top": ((1, 0, 0), (0, 0, 1))}
 FIGURE_9 = (256, 64, 256)

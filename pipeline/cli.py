@@ -48,7 +48,7 @@ FrameRange = Annotated[str | None, Parameter(help="Only these, as 1-10,20,30-40x
 
 def _run(verb: str, scene: Path, quick: bool, out: Path, quiet: bool, frames: str | None = None) -> None:
     from pipeline import stages
-    from pipeline.frames import frames as parsed
+    from pipeline.frame_ranges import frames as parsed
     from pipeline.progress import Progress
     from pipeline.scene import load
 

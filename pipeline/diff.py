@@ -89,13 +89,13 @@ def check(scene_file: Path, out: Path, progress: Progress) -> list[str]:
     Writes the report out/quick/X/diff/index.html with its picture. Raises BadInput if there is no reference,
     and what the stages raise.
     """
-    from pipeline import evidence
+    from pipeline import diff_report
 
     load(scene_file, quick=True)  # a scene that is not there lacks more than a reference
     record = references.record_of(scene_file)
     works = references.baked(scene_file, out, progress)
     found = list(findings(works, references.folder_of(scene_file), record))
-    page = evidence.write(scene_file.stem, found, works.root / "diff")
+    page = diff_report.write(scene_file.stem, found, works.root / "diff")
     lines = [f"{scene_file.stem}: {line}" for line in _first_of_each([f for f in found if f.fault])]
     if lines:
         meant = f"if it is meant, type: flowloom references {scene_file}"

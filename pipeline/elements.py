@@ -26,7 +26,7 @@ MANY = 200  # threads or sheets, where the scene does not say how many
 FOLLOWED = 0.2  # of its frames and samples, to each side: what a bundle does more slowly than that is not detail
 LIFT = 2.5  # seconds that a lift takes at least
 NEIGHBOURS = 9  # threads that are copied side by side
-TOPOLOGIES = {"beads": "none", "shoal": "none", "noodles": "thread", "papers": "sheet"}
+TOPOLOGIES = {"beads": "none", "school": "none", "noodles": "thread", "paper": "sheet"}
 """How the elements hang together that a [render] kind draws."""
 PLURALS = {"none": "points", "thread": "threads", "sheet": "sheets"}
 SIZES = {"none": 0.8, "thread": 0.38, "sheet": 0.02}
@@ -49,7 +49,7 @@ def make_exemplar(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iter
 
 
 def _exemplar(scene: ElementsScene) -> Elements:
-    from synth.elements import arrangement, handmade, school, simulation
+    from synth.elements import arrangement, keyframed, school, simulation
 
     wanted: Any = scene.exemplar
     match wanted.kind:
@@ -61,16 +61,16 @@ def _exemplar(scene: ElementsScene) -> Elements:
             return arrangement.hexagonal_grid((wanted.across, wanted.across + wanted.across % 2))
         case "dots":
             return arrangement.drawn(pictures.read_foreign(wanted.file, "exemplar.file")[::-1])
-        case "shoal":
-            shoals: dict[str, Any] = {
+        case "school":
+            schools: dict[str, Any] = {
                 "homogeneous": school.homogeneous, "crossing": school.crossing, "mixed": school.mixed}
-            return shoals[wanted.behaviour](wanted.count, frames=wanted.frames, rate=scene.fps, seed=scene.seed)[0]
+            return schools[wanted.behaviour](wanted.count, frames=wanted.frames, rate=scene.fps, seed=scene.seed)[0]
         case "noodles":
-            threads: Any = simulation.noodles if wanted.style == "simulated" else handmade.jagged
+            threads: Any = simulation.noodles if wanted.style == "simulated" else keyframed.jagged
             return threads(frames=wanted.frames, rate=scene.fps, seed=scene.seed)
-        case "papers":
-            sheets: dict[str, Any] = {"simulated": simulation.sheets, "folded": handmade.folded,
-                                      "fluttering": handmade.fluttering}
+        case "paper":
+            sheets: dict[str, Any] = {"simulated": simulation.sheets, "folded": keyframed.folded,
+                                      "fluttering": keyframed.fluttering}
             return sheets[wanted.style](frames=wanted.frames, rate=scene.fps, seed=scene.seed)
     with blaming("exemplar.file"):
         return _from_tracks(scene, wanted)
@@ -266,7 +266,7 @@ def _decomposed(example: Elements) -> Elements:
 
 def make_coarse(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Elements]]:
     """C of threads or sheets, as many as the output has."""
-    from synth.elements import bundle, scraps, simulation
+    from synth.elements import bundle, falling_paper, simulation
 
     wanted: Any = scene.coarse
     example = _decomposed(stock.read("exemplar"))
@@ -286,7 +286,7 @@ def make_coarse(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterat
             raise WrongValue("coarse.kind", f'"gust" tosses square sheets; those of the exemplar are '
                                             f"{_sized(example.grid)}")
         with blaming("elements.count"):
-            tossed = scraps.tossed(count, side=example.grid[0], **settings)
+            tossed = falling_paper.tossed(count, side=example.grid[0], **settings)
         yield 0, _scaled(tossed, spacing)
         return
     thick = float(np.linalg.norm(bundle.section(count, 1.0), axis=1).max()) + 0.5
@@ -385,7 +385,7 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
         name="exemplar", stage="synth", folder="fields", suffix=_npz, animated=False,
         reads=("exemplar", "elements.spacing", "elements.radius", "render.kind", "seed", "fps", *fitted), inputs=(),
         methods=("synth.elements.arrangement", "synth.elements.school", "synth.elements.simulation",
-                 "synth.elements.handmade"), make=make_exemplar, write=write_tracks, read=read_tracks)
+                 "synth.elements.keyframed"), make=make_exemplar, write=write_tracks, read=read_tracks)
     made = [example]
     coarse: tuple[tuple[str, Frames], ...] = ()
     if scene.flows:
@@ -397,7 +397,7 @@ def products(scene: ElementsScene) -> tuple[Product, ...]:
             name="coarse", stage="synth", folder="fields", suffix=_npz, animated=False,
             reads=("coarse", "elements.count", "elements.spacing", "frames", "seed", "fps"),
             inputs=(("exemplar", "once"),),
-            methods=("synth.elements.simulation", "synth.elements.scraps", "synth.elements.bundle"), make=make_coarse,
+            methods=("synth.elements.simulation", "synth.elements.falling_paper", "synth.elements.bundle"), make=make_coarse,
             write=write_tracks, read=read_tracks, check=check_coarse))
         coarse = (("coarse", "once"),)
     made.append(Product(

@@ -44,10 +44,10 @@ class DotsExemplar(Table):
     file: Asset = key("PNG")
 
 
-class ShoalExemplar(Table):
+class SchoolExemplar(Table):
     """Fish that swim together along x (figure 9)."""
 
-    kind: Literal["shoal"] = key("fish")
+    kind: Literal["school"] = key("fish")
     behaviour: Literal["homogeneous", "crossing", "mixed"] = key(
         "everywhere alike (figure 9a), groups between which some dart (9c), or large ones among small (9e)",
         "homogeneous")
@@ -66,7 +66,7 @@ class ThreadExemplar(Table):
 class SheetExemplar(Table):
     """A few sheets of paper (figure 13a, b)."""
 
-    kind: Literal["papers"] = key("sheets")
+    kind: Literal["paper"] = key("sheets")
     style: Literal["simulated", "folded", "fluttering"] = key(
         "in turbulent air (figure 13a), or by hand: folding, or waves along them (13b)", "simulated")
     frames: int = key("of the exemplar", 60, "frames", ge=2, le=10000)
@@ -79,11 +79,11 @@ class TracksExemplar(Table):
     file: AssetOrFolder = key("CSV, a folder of one PLY or OBJ file per frame, USD, or our own NPZ; see above")
     rate: float | None = key("none: what the file says, or else the scene's fps, to which the motion is resampled",
                              None, "frames per second", gt=0, le=1000)
-    captured: bool = key("a shoal tracked in a film, x and y in pixels, y down (§6.4): its tracks are smoothed, and "
+    captured: bool = key("a school tracked in a film, x and y in pixels, y down (§6.4): its tracks are smoothed, and "
                          "its mean motion is taken out; in space it is at depth 0", False)
 
 
-ElementsExemplar = ArrangedExemplar | DotsExemplar | ShoalExemplar | ThreadExemplar | SheetExemplar | TracksExemplar
+ElementsExemplar = ArrangedExemplar | DotsExemplar | SchoolExemplar | ThreadExemplar | SheetExemplar | TracksExemplar
 
 
 class CarriedThreads(Table):
@@ -181,14 +181,14 @@ class BeadsRender(Table):
         "exemplar")
 
 
-class ShoalRender(Table):
+class SchoolRender(Table):
     """Fish under water."""
 
-    kind: Literal["shoal"] = key("fish in the sea")
+    kind: Literal["school"] = key("fish in the sea")
     width: int = key("of the picture", 960, "pixels", ge=16, le=LARGEST)
     height: int = key("of the picture", 540, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 128, ge=1, le=65536)
-    speed: float = key("at which the shoal swims along x, as the picture follows it", 2.2, "spacings per second", ge=0,
+    speed: float = key("at which the school swims along x, as the picture follows it", 2.2, "spacings per second", ge=0,
                        le=1000)
 
 
@@ -201,10 +201,10 @@ class NoodlesRender(Table):
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
 
 
-class PapersRender(Table):
+class PaperRender(Table):
     """Sheets of paper in the air."""
 
-    kind: Literal["papers"] = key("paper in a studio")
+    kind: Literal["paper"] = key("paper in a studio")
     width: int = key("of the picture", 960, "pixels", ge=16, le=LARGEST)
     height: int = key("of the picture", 540, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
@@ -250,7 +250,7 @@ class ElementsScene(Table):
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = key(
         "solids that elements keep out of, an array of tables [[obstacles]]", (), max_length=64)
     synthesis: Synthesis = Synthesis()
-    render: BeadsRender | ShoalRender | NoodlesRender | PapersRender = Field(discriminator="kind")
+    render: BeadsRender | SchoolRender | NoodlesRender | PaperRender = Field(discriminator="kind")
     figure: ElementsFigure = ElementsFigure()
 
     @property

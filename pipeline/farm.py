@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 from pipeline.errors import BadInput, FlowloomError
-from pipeline.frames import spelled
+from pipeline.frame_ranges import spelled
 from pipeline.scene import load
 
 

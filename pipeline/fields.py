@@ -203,16 +203,16 @@ def _flat_synthesis(scene: Scene, stock: Stock) -> tuple[Any, type]:
 
 
 def _solid_synthesis(scene: Scene, stock: Stock) -> tuple[Any, type]:
-    from synth.motion import solid
+    from synth.motion import synthesis_3d
 
     views = solid_views(scene, {name: stock.read(name).values for name in scene.exemplars})
     distance = obstacles.distance(scene, stock) if scene.detail.boundary else None
-    return solid.Synthesis(views, _solid_shape(scene), solid_settings(scene), scene.seed, distance), solid.State
+    return synthesis_3d.Synthesis(views, _solid_shape(scene), solid_settings(scene), scene.seed, distance), synthesis_3d.State
 
 
 def solid_views(scene: Scene, values: dict[str, np.ndarray]) -> list[Any]:
     """The views of a 3-D scene for synth.motion.solid; values: of each exemplar, by its product's name."""
-    from synth.motion.solid import View
+    from synth.motion.synthesis_3d import View
 
     tables = {value_at(scene, key): name for name, key in scene.exemplars.items()}
     return [View(values[tables[view.exemplar]], *view.axes, weight=view.weight) for view in scene.seen]
@@ -220,21 +220,21 @@ def solid_views(scene: Scene, values: dict[str, np.ndarray]) -> list[Any]:
 
 def solid_settings(scene: Scene) -> Any:
     """The settings of the synthesis in space."""
-    from synth.motion import detail, solid
+    from synth.motion import detail, synthesis_3d
 
     wanted = scene.detail
     levels = detail.enough_levels(min(view.exemplar.size for view in scene.seen if view.exemplar)) if (
         wanted.levels == "auto") else wanted.levels
-    return solid.Settings(levels, wanted.neighborhoods, wanted.iterations, wanted.search, wanted.k, wanted.along)
+    return synthesis_3d.Settings(levels, wanted.neighborhoods, wanted.iterations, wanted.search, wanted.k, wanted.along)
 
 
 def detail_memory(scene: Scene) -> tuple[float, str]:
     """Bytes that the synthesis of a 3-D H takes, and the key that decides."""
-    from synth.motion import solid
+    from synth.motion import synthesis_3d
 
     cells = {name: np.broadcast_to(np.float32(1), _exemplar_shape(value_at(scene, key)))
              for name, key in scene.exemplars.items()}  # stand-ins that take no memory
-    return solid.memory_needed(solid_views(scene, cells), _solid_shape(scene), solid_settings(scene)), "detail.size"
+    return synthesis_3d.memory_needed(solid_views(scene, cells), _solid_shape(scene), solid_settings(scene)), "detail.size"
 
 
 def _exemplar_shape(exemplar: Any) -> tuple[int, ...]:
@@ -251,7 +251,7 @@ def coarse_cells(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
 
 def towards(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
     """What the local z axis faces (Z, Y, X, 3), of any length, on the cells of H (§3.3)."""
-    from synth.motion import frames as local
+    from synth.motion import local_axes as local
     from synth.motion.coarse import upsample
 
     match scene.detail.facing:
@@ -346,7 +346,7 @@ def coarse_product(scene: AnyScene) -> Product:
 def _method(scene: Scene) -> str:
     """The module that synthesizes H."""
     if scene.dimension == 3:
-        return "synth.motion.solid"
+        return "synth.motion.synthesis_3d"
     if scene.detail.samples == "lagrangian":
         return "synth.motion.lagrangian"
     return "synth.motion.potential" if scene.detail.synthesize == "potential" else "synth.motion.detail"

@@ -29,7 +29,7 @@ LABELS = {
     "combined-colour": "*F* = *L* + *ωH′*", "result": "result",
 }
 INSET = 0.27  # of a panel's width
-METHODS = ("render.layout", "render.film", "render.lic")
+METHODS = ("render.layout", "render.tonemap", "render.lic")
 
 
 def make(works: Works, progress: Progress) -> None:
@@ -121,14 +121,14 @@ def _label(scene: Scene, panel: panels.Shown) -> str:
 
 
 def _panel(works: Works, variant: str, panel: panels.Shown, frame: int, still: bool, label: str) -> Any:
-    from render import film, layout, lic
+    from render import layout, lic, tonemap
 
     scene = works.scenes.variants[variant]
     product = _product(works, variant, panel, still)
     file = works.file(variant, product.name, _frame(product.animated, scene, frame))
     light = product.read(file, scene)
     width = _width(scene, panel)
-    shown = layout.fitted(film.developed(light, _tone(scene, panel)), width)
+    shown = layout.fitted(tonemap.to_display(light, _tone(scene, panel)), width)
     legend = lic.wheel(width // 6) if panel.style == "colour" else None
     return layout.Panel(shown, label, inset=_inset(works, variant, panel, frame), legend=legend)
 
@@ -142,14 +142,14 @@ def _tone(scene: Scene, panel: panels.Shown) -> Literal["filmic", "straight"]:
 
 def _inset(works: Works, variant: str, panel: panels.Shown, frame: int) -> np.ndarray | None:
     """The exemplar, in a corner of the result."""
-    from render import film, layout
+    from render import layout, tonemap
 
     scene = works.scenes.variants[variant]
     if not isinstance(scene, ElementsScene) or not scene.figure.inset or panel.panel != "result":
         return None
     product = works.products[variant]["exemplar-picture"]
     light = product.read(works.file(variant, product.name, _frame(product.animated, scene, frame)), scene)
-    return layout.fitted(film.developed(light, "filmic"), round(INSET * scene.figure.panel))
+    return layout.fitted(tonemap.to_display(light, "filmic"), round(INSET * scene.figure.panel))
 
 
 def _width(scene: Scene, panel: panels.Shown) -> int:

@@ -34,7 +34,7 @@ from synth.field import Field, domain_origin
 
 def transformed(scene: Scene, stock: Stock, frame: int) -> np.ndarray:
     """H' (Y, X, 2) or (Z, Y, X, 3): H in the domain's coordinates (§3.1, CoordinateTransform)."""
-    from synth.motion import frames as local
+    from synth.motion import local_axes as local
 
     L, along = coarse_cells(scene, stock, frame), scene.detail.along
     if scene.dimension == 2:
@@ -82,7 +82,7 @@ def _placed(scene: Scene, stock: Stock, density: np.ndarray) -> Field:
         density = density * np.clip(fine * scene.density.scale + 0.5, 0, 1)
     if scene.density.depth is None:
         return Field.centred(density, scene.dimension)
-    from synth.motion.depth import inflate
+    from synth.motion.inflate import inflate
 
     return Field.centred(inflate(density, scene.density.depth.reach), 3)
 
@@ -164,18 +164,18 @@ Points = dict[str, np.ndarray]
 
 def make_blades(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, Mesh]]:
     """The blades as one mesh, as `meshes.write` takes it. Each frame is made of F of its window alone."""
-    from synth import blades
+    from synth import seaweed
 
     wanted = scene.blades
     width, _, depth = (cells / scene.detail.size[1] for cells in scene.detail.size)
-    plants = blades.bed(width, depth, wanted.height, wanted.spacing, wanted.cover, scene.seed)
+    plants = seaweed.bed(width, depth, wanted.height, wanted.spacing, wanted.cover, scene.seed)
     motion: dict[int, Field] = {}
     for frame in frames:
         window = range(max(frame - wanted.window, 0) + 1, frame + 1)
         motion = {i: motion[i] if i in motion else _motion(scene, stock, i) for i in window}
         before = [motion[window[0]]] * (wanted.window - len(window))  # it moved so before the first frame
-        spines = blades.spines(plants, [*before, *motion.values()], wanted.bend)
-        yield frame, dict(zip(("vertices", "faces", "colours"), blades.ribbons(plants, spines), strict=True))
+        spines = seaweed.spines(plants, [*before, *motion.values()], wanted.bend)
+        yield frame, dict(zip(("vertices", "faces", "colours"), seaweed.ribbons(plants, spines), strict=True))
 
 
 def _motion(scene: Scene, stock: Stock, frame: int) -> Field:
@@ -250,7 +250,7 @@ def _density_suffix(scene: Scene) -> str:
     return suffix(scene) if scene.density.depth is None else "vdb"
 
 
-TRANSFORM = ("synth.motion.combine", "synth.motion.frames", "synth.field")
+TRANSFORM = ("synth.motion.combine", "synth.motion.local_axes", "synth.field")
 
 
 def products(scene: Scene) -> tuple[Product, ...]:
@@ -264,7 +264,7 @@ def products(scene: Scene) -> tuple[Product, ...]:
     density = Product(
         name="density", stage="bake", folder="geometry", suffix=_density_suffix,
         reads=("density", "combine", *LOCAL_FRAME, "seed", "fps"), inputs=(*every, *obstacles.inputs(scene)),
-        methods=("synth.motion.density", "synth.motion.depth", "synth.pyramid", *TRANSFORM), make=make_density,
+        methods=("synth.motion.density", "synth.motion.inflate", "synth.pyramid", *TRANSFORM), make=make_density,
         write=write_field, read=read_field, memory=density_memory)
     particles = Product(
         name="particles", stage="bake", folder="geometry", suffix=_ply,
@@ -273,6 +273,6 @@ def products(scene: Scene) -> tuple[Product, ...]:
     blades = Product(
         name="blades", stage="bake", folder="geometry", suffix=_ply,
         reads=("blades", "combine", *LOCAL_FRAME, "seed", "fps"), inputs=(*every, *solid),
-        methods=("synth.blades", *TRANSFORM), make=make_blades, write=write_mesh, read=read_mesh)
+        methods=("synth.seaweed", *TRANSFORM), make=make_blades, write=write_mesh, read=read_mesh)
     moved = {"none": (), "seaweed": (blades,), "particles": (particles,)}
     return (final, *moved.get(scene.render.kind, (density,)))

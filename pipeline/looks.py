@@ -30,7 +30,7 @@ def mesh_of(scene: ElementsScene, elements: Elements, frame: int) -> Mesh:
         case "beads":
             return mesh.solids(_in_domain(scene, elements.positions[frame, :, 0]), elements.size,
                                _bead_colours(scene, elements))
-        case "shoal":
+        case "school":
             gait = fish.swimming(swum(scene, elements), elements.size, elements.rate, scene.seed)
             return fish.bodies(elements.positions[frame, :, 0], gait.heading[frame], elements.size, elements.colour,
                                gait.phase[frame], gait.turn[frame])
@@ -56,14 +56,14 @@ def _bead_colours(scene: ElementsScene, elements: Elements) -> np.ndarray:
     return np.stack([np.interp(share, np.arange(len(ORIGINS)), ORIGINS[:, c]) for c in range(3)], axis=-1)
 
 
-SHARES = (0.40, 0.25, 0.14, 0.12, 0.09)  # of the sheets, of each colour of papers.PALETTE
+SHARES = (0.40, 0.25, 0.14, 0.12, 0.09)  # of the sheets, of each colour of paper.PALETTE
 
 
 def _paper_colours(scene: ElementsScene, elements: Elements) -> np.ndarray:
     """Colours (E, 3) of the sheets."""
-    from render.papers import PALETTE
+    from render.paper import PALETTE
 
-    if scene.render.kind != "papers" or scene.render.colour == "exemplar":
+    if scene.render.kind != "paper" or scene.render.colour == "exemplar":
         return elements.colour
     rng = np.random.Generator(np.random.Philox(key=scene.seed))
     return np.array(PALETTE)[rng.choice(len(PALETTE), elements.count, p=SHARES)]
@@ -103,17 +103,17 @@ def write_stage(file: Path, elements: Elements, scene: ElementsScene) -> None:
 
     Fish bend, and Blender (4.2) shows the first frame of instances in all: so they are meshes, not instances.
     """
-    from pipeline.files import stage
+    from pipeline.files import usd
     from synth.elements import mesh
 
-    def shoal(frame: int) -> dict[str, Any]:
+    def school(frame: int) -> dict[str, Any]:
         return {"fish": mesh_of(scene, elements, frame - 1)}
 
     def sheets(frame: int) -> dict[str, Any]:
         surface = elements.positions[frame - 1].reshape(elements.count, *elements.grid, 3)
         return {"sheets": mesh.shells(surface, elements.size, _paper_colours(scene, elements))}
 
-    stage.write(file, elements, {"shoal": shoal, "papers": sheets}.get(scene.render.kind))
+    usd.write(file, elements, {"school": school, "paper": sheets}.get(scene.render.kind))
 
 
 def read_stage(file: Path, scene: ElementsScene) -> bytes:
@@ -137,21 +137,21 @@ def _extent(elements: Elements) -> np.ndarray:
 def _picture(scene: ElementsScene, mesh: dict[str, np.ndarray], frame: int, ground: Any, extent: np.ndarray, width: int,
              spp: int, inset: bool = False) -> np.ndarray:
     """One picture of elements that have an extent; an inset is a square that they fill."""
-    from render import beads, noodles, papers, shoal, studio
+    from render import beads, noodles, paper, school, studio
 
     render: Any = scene.render
     if render.kind == "beads":
         return beads.picture(**mesh, ground=ground, settings=beads.Settings(width=width, spp=spp, seed=scene.seed))
     height = width if inset else round(render.height * width / render.width)
     how: dict[str, Any] = {"width": width, "height": height, "spp": spp, "seed": scene.seed}
-    looks: dict[str, Any] = {"shoal": shoal, "noodles": noodles, "papers": papers}
+    looks: dict[str, Any] = {"school": school, "noodles": noodles, "paper": paper}
     look = looks[render.kind]
-    if render.kind == "shoal":
+    if render.kind == "school":
         how["time"] = frame / scene.fps
     elif not inset and render.kind == "noodles":
         how["camera"], how["plate"] = noodles.view(extent[0], extent[1], width / height)
     elif not inset:
-        how["camera"] = studio.framing(extent[0], extent[1], papers.CAMERA, width / height)
+        how["camera"] = studio.framing(extent[0], extent[1], paper.CAMERA, width / height)
     settings = look.Settings(**how)
     made: np.ndarray = (look.inset(**mesh, low=extent[0], high=extent[1], settings=settings) if inset
                         else look.picture(**mesh, settings=settings))
@@ -197,10 +197,10 @@ def make_exemplar_picture(scene: ElementsScene, stock: Stock, frames: list[int])
 def make_coarse_picture(scene: ElementsScene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The coarse motion: elements without details, or the lines of a flow."""
     if scene.flows:
-        from render import film, lic
+        from render import lic, tonemap
 
         for frame in frames:
-            yield frame, film.decoded(lic.picture(stock.read("L", frame).values, scene.figure.panel, scene.seed))
+            yield frame, tonemap.from_srgb(lic.picture(stock.read("L", frame).values, scene.figure.panel, scene.seed))
         return
     coarse = stock.read("coarse")
     for frame in frames:
@@ -212,7 +212,7 @@ def make_coarse_picture(scene: ElementsScene, stock: Stock, frames: list[int]) -
 def products(scene: ElementsScene) -> tuple[Product, ...]:
     """The meshes, the USD file, and the pictures that the figure shows."""
     solid = obstacles.inputs(scene)
-    shape = ("synth.elements.fish" if scene.render.kind == "shoal" else "synth.elements.mesh",)
+    shape = ("synth.elements.fish" if scene.render.kind == "school" else "synth.elements.mesh",)
     mesh_keys = ("render.kind", "render.colour", "render.speed", "elements.spacing", "seed")
     ground = ("elements.domain", "elements.size", "elements.toroidal")
     made = [

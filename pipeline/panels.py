@@ -155,16 +155,16 @@ def make_input(panel: Shown) -> Callable[[Scene, Stock, list[int]], Iterator[tup
     """Makes an exemplar as figure 4 shows it: a bitmap itself, the colours of any other."""
 
     def make(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
-        from render import film, lic
+        from render import lic, tonemap
 
         width, key = scene.figure.panel, scene.exemplars[panel.exemplar]
         exemplar: Any = value_at(scene, key)
         if exemplar.kind in ("bitmap", "drawing") and exemplar.file.suffix != ".svg":
             picture = pictures.read_foreign(exemplar.file, f"{key}.file")
             height = lic.height_for(picture.shape, width)
-            yield 0, film.decoded(np.clip(pictures.resized(picture, width, height), 0, 1))
+            yield 0, tonemap.from_srgb(np.clip(pictures.resized(picture, width, height), 0, 1))
         else:
-            yield 0, film.decoded(lic.colour(field_values(panel, scene, stock, 0), width))
+            yield 0, tonemap.from_srgb(lic.colour(field_values(panel, scene, stock, 0), width))
 
     return make
 
@@ -201,7 +201,7 @@ def maker(panel: Shown) -> Callable[[Scene, Stock, list[int]], Iterator[tuple[in
     """Makes the pictures of a field: lines, colour, arrows or divergence."""
 
     def make(scene: Scene, stock: Stock, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
-        from render import film, lic
+        from render import lic, tonemap
 
         width = scene.figure.panel
         for frame in frames:
@@ -214,7 +214,7 @@ def maker(panel: Shown) -> Callable[[Scene, Stock, list[int]], Iterator[tuple[in
                 detail = panel.panel.startswith("detail")
                 wrong = _flat(stock.read("H", frame).values, scene) if detail else None
                 shown = with_arrows(shown, values, wrong)
-            yield frame, film.decoded(shown)
+            yield frame, tonemap.from_srgb(shown)
 
     return make
 
@@ -259,7 +259,7 @@ def products(scene: Scene) -> tuple[Product, ...]:
         make = make_input(panel) if what == "input" else maker(panel)
         made.append(Product(
             name=panel.picture, stage="render", folder="images", suffix=suffix, reads=reads, inputs=inputs,
-            methods=("render.lic", "render.arrows", "synth.motion.frames"), make=make, write=write_light,
+            methods=("render.lic", "render.arrows", "synth.motion.local_axes"), make=make, write=write_light,
             read=read_light, animated=what not in ("input", "exemplar")))
     return tuple(made)
 

@@ -111,7 +111,7 @@ def proof_settings(render: Any) -> Any:
     if render.kind == "volume":
         height = round(render.height * width / render.width)
         small |= {"height": height, "spp": PROOF_SAMPLES, "denoised": False}
-    if render.kind in ("seaweed", "shoal", "noodles", "papers"):
+    if render.kind in ("seaweed", "school", "noodles", "paper"):
         small |= {"height": round(render.height * width / render.width), "spp": PROOF_SAMPLES}
     if render.kind in ("particles", "beads"):
         small |= {"spp": PROOF_SAMPLES}

@@ -397,10 +397,10 @@ def _shown(scene: AnyScene) -> Faults:
         yield "figure.panels", 'there is no "coarse" without a [coarse]'
 
 
-LOOKS = {"noodles": ("noodles",), "papers": ("papers",), "shoal": ("shoal",),
-         "tracks": ("beads", "shoal", "noodles", "papers")}
+LOOKS = {"noodles": ("noodles",), "paper": ("paper",), "school": ("school",),
+         "tracks": ("beads", "school", "noodles", "paper")}
 """The [render] kinds that draw an exemplar of elements: "beads" those that are not here."""
-CARRIED = {"noodles": ("lifted", "tracks"), "papers": ("gust", "tracks")}
+CARRIED = {"noodles": ("lifted", "tracks"), "paper": ("gust", "tracks")}
 """The kinds of [coarse] that threads and sheets have, by their [render] kind."""
 
 
@@ -410,7 +410,7 @@ def _element_kinds(scene: ElementsScene) -> Faults:
     looks = LOOKS.get(exemplar.kind, ("beads",))
     if render not in looks:
         yield "render.kind", f'"{render}" draws no {exemplar.kind}: say "{looks[0]}"'
-    if isinstance(exemplar, TracksExemplar) and exemplar.captured and render not in ("beads", "shoal"):
+    if isinstance(exemplar, TracksExemplar) and exemplar.captured and render not in ("beads", "school"):
         yield "exemplar.captured", f'is for points, not for {render}'
     if render != "beads" and scene.frames < 2:
         yield "frames", f"an animation of {render} has 2 or more, not {scene.frames}"

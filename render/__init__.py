@@ -10,7 +10,7 @@ In the order data passes through them:
     surface   meshes, cameras and lamps as Mitsuba takes them
     water     light under water: caustics, fog, shafts, sand
     seaweed   blades under water, by path tracing
-    shoal     fish in a cube of water
+    school     fish in a cube of water
     noodles   threads as noodles on a plate
     papers    sheets as paper in the air
     beads     particles of the plane as beads on paper, past obstacles

@@ -1,7 +1,7 @@
 """Particles of the plane as beads on white paper, photographed from straight above; obstacles stand on it.
 
 `picture` path-traces solids with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row first. An
-exemplar's inset is the same picture of its own ground. `render.film` tones it ("filmic").
+exemplar's inset is the same picture of its own ground. `render.tonemap` tones it ("filmic").
 
 World units; x to the right and y up in the picture, z towards the camera.
 """
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, film, surface
+from render import backend, mitsuba_shapes, tonemap
 
 SLANT = (-0.42, 0.62, 1.0)  # towards the lamp: from the upper left
 LAMP = 0.34  # edge of the lamp over its distance: how soft shadows are
@@ -88,15 +88,15 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, ground
         },
         "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}},
         "sensor": {
-            **surface.film(settings.width, height), "type": "orthographic", "near_clip": 0.1, "far_clip": 10.0,
+            **mitsuba_shapes.film(settings.width, height), "type": "orthographic", "near_clip": 0.1, "far_clip": 10.0,
             "to_world": transform().look_at(origin=[0, 0, 5], target=[0, 0, 0], up=[0, 1, 0]).scale(
                 [0.5 * aspect, 0.5 * aspect, 1]),
         },
     }
     if len(faces):
-        scene["particles"] = surface.shape(mi, "particles", (vertices - middle) * scale, faces,
-                                           film.decoded(colours / 255.0), glossy)
-    light = mi.render(mi.load_dict(scene), integrator=surface.every_lamp(mi, BOUNCES), spp=settings.spp,
+        scene["particles"] = mitsuba_shapes.shape(mi, "particles", (vertices - middle) * scale, faces,
+                                           tonemap.from_srgb(colours / 255.0), glossy)
+    light = mi.render(mi.load_dict(scene), integrator=mitsuba_shapes.every_lamp(mi, BOUNCES), spp=settings.spp,
                       seed=settings.seed)
     return np.array(light, np.float32)
 
@@ -114,7 +114,7 @@ def _ground(mi: Any, ground: Ground, height: int, scale: float, middle: np.ndarr
     points = np.stack([(x - middle[0]) * scale, (y - middle[1]) * scale, z], -1).reshape(-1, 3)
     used, faces = np.unique(tiled(z, colour), return_inverse=True)
     points, colour, faces = points[used], colour.reshape(-1, 3)[used], faces.reshape(-1, 3)
-    return surface.shape(mi, "ground", points, faces, colour, {
+    return mitsuba_shapes.shape(mi, "ground", points, faces, colour, {
         "type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}})
 
 

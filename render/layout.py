@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from render import film
+from render import tonemap
 
 FRAME = 0.45  # display grey of the thin frame round a panel
 INK = 0.10  # display grey of the lettering
@@ -59,8 +59,8 @@ def fitted(picture: np.ndarray, width: int) -> np.ndarray:
     if width > w:
         rows, columns = np.arange(height) * h // height, np.arange(width) * w // width
         return np.ascontiguousarray(shown[rows][:, columns])
-    narrower = _averaged_rows(_averaged_rows(film.decoded(shown), height).swapaxes(0, 1), width).swapaxes(0, 1)
-    return film.encoded(narrower).astype(np.float32)
+    narrower = _averaged_rows(_averaged_rows(tonemap.from_srgb(shown), height).swapaxes(0, 1), width).swapaxes(0, 1)
+    return tonemap.to_srgb(narrower).astype(np.float32)
 
 
 def _averaged_rows(values: np.ndarray, count: int) -> np.ndarray:
@@ -194,7 +194,7 @@ def _finished(panel: Panel) -> np.ndarray:
 
 def _eight_bit(picture: np.ndarray) -> np.ndarray:
     """Bytes as they are; float values dithered, here and not at the end, so that bytes keep their value."""
-    return picture if picture.dtype == np.uint8 else film.eight_bit(picture)
+    return picture if picture.dtype == np.uint8 else tonemap.eight_bit(picture)
 
 
 def _framed(picture: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import functools
 import numpy as np
 from scipy import ndimage, sparse
 
-from render import film
+from render import tonemap
 from synth.projection import divergence as _divergence
 
 OVERSAMPLING = 2  # lines are finished on a grid this much finer and averaged down: no jagged streaks
@@ -184,7 +184,7 @@ def _hued(lightness: np.ndarray, chroma: np.ndarray, angle: np.ndarray) -> np.nd
     """Display values (..., 3) of Oklab lightness, chroma and hue (0 = +x is red, counter-clockwise)."""
     hue = angle + np.deg2rad(29.0)  # Oklab's red
     lab = np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=-1)
-    return film.encoded(film.oklab_to_linear(lab)).astype(np.float32)
+    return tonemap.to_srgb(tonemap.oklab_to_linear(lab)).astype(np.float32)
 
 
 def colour(v: np.ndarray, width: int) -> np.ndarray:

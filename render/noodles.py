@@ -1,7 +1,7 @@
 """Noodles on a plate, by window light: round, glossy, a little translucent.
 
 `picture` path-traces tubes with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row first;
-`inset` does the same with an exemplar, alone on the table. `render.film` tones both ("filmic").
+`inset` does the same with an exemplar, alone on the table. `render.tonemap` tones both ("filmic").
 
 There is no scattering under a surface. Instead a part of the light goes through a tube's wall, diffusely, into the
 tube and out again on the other side, and takes the colour of dough each time: thin places and edges against the
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from render import backend, film, studio, surface
+from render import backend, mitsuba_shapes, studio, tonemap
 
 CAMERA = studio.Camera(position=(0.0, 2.15, 4.7), target=(0.0, 0.125, 0.0), fov=13.2)
 WINDOW = studio.Softbox((-3.1, 2.8, -1.7), (0.0, 0.1, 0.0), (2.4, 2.0), (22.0, 19.8, 17.0), 1.0)  # left, behind
@@ -88,19 +88,19 @@ def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settin
     mi = backend.mitsuba("llvm_ad_rgb")
     scene = {
         "type": "scene",
-        "sensor": surface.sensor(mi, settings.camera, settings.width, settings.height),
-        "window": surface.lamp(mi, WINDOW), "fill": surface.lamp(mi, FILL),
+        "sensor": mitsuba_shapes.sensor(mi, settings.camera, settings.width, settings.height),
+        "window": mitsuba_shapes.lamp(mi, WINDOW), "fill": mitsuba_shapes.lamp(mi, FILL),
         "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}},
-        "noodles": surface.shape(mi, "noodles", vertices, faces, film.decoded(colours / 255.0), dough()),
-        "table": surface.plain(mi, "table", table(level), {"type": "twosided", "bsdf": {
+        "noodles": mitsuba_shapes.shape(mi, "noodles", vertices, faces, tonemap.from_srgb(colours / 255.0), dough()),
+        "table": mitsuba_shapes.plain(mi, "table", table(level), {"type": "twosided", "bsdf": {
             "type": "principled", "base_color": {"type": "rgb", "value": list(TABLE)}, "roughness": 0.55,
             "specular": 0.35}}),
     }
     if radius:
-        scene["plate"] = surface.plain(mi, "plate", plate(radius, at), {
+        scene["plate"] = mitsuba_shapes.plain(mi, "plate", plate(radius, at), {
             "type": "principled", "base_color": {"type": "rgb", "value": list(GLAZE)}, "roughness": 0.42,
             "specular": 0.5, "clearcoat": 0.5, "clearcoat_gloss": 0.9})
-    light = mi.render(mi.load_dict(scene), integrator=surface.every_lamp(mi, BOUNCES), spp=settings.spp,
+    light = mi.render(mi.load_dict(scene), integrator=mitsuba_shapes.every_lamp(mi, BOUNCES), spp=settings.spp,
                       seed=settings.seed)
     return np.array(light, np.float32)
 

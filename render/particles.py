@@ -1,7 +1,7 @@
 """Particles on a river, seen from straight above: short streaks of foam over dark water, past stones.
 
 `stage` photographs bed and stones once, by Mitsuba; `river` draws a frame's particles on it. Both return linear Rec.709
-light (h, w, 3) float32, the top row first; `render.film` tones it ("filmic").
+light (h, w, 3) float32, the top row first; `render.tonemap` tones it ("filmic").
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, film, lic
+from render import backend, lic, tonemap
 from synth.noise import gradient_noise
 
 # the stones, in heights of the picture: how wide their shoulder is at most, and how high it rises over its width
@@ -143,7 +143,7 @@ def foam_colour(speed: np.ndarray) -> np.ndarray:
     at = np.clip(speed, 0, 1) * (len(FOAM) - 1)
     low = np.minimum(at.astype(int), len(FOAM) - 2)
     oklab = FOAM[low] + (at - low)[..., None] * (FOAM[low + 1] - FOAM[low])
-    return np.maximum(film.oklab_to_linear(oklab), 0)
+    return np.maximum(tonemap.oklab_to_linear(oklab), 0)
 
 
 def river(position: np.ndarray, velocity: np.ndarray, age: np.ndarray, life: int, back: np.ndarray,

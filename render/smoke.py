@@ -2,7 +2,7 @@
 
 `lit` and `ink` draw a 2-D density (Y, X); `volume` path-traces a 3-D one (Z, Y, X) with Mitsuba. All take y
 up (row 0 is the bottom), return linear Rec.709 light (h, w, 3) float32 with the top row first, and give the
-same bits each time. `render.film` turns light into a picture: "filmic" for `lit` and `volume`, "straight"
+same bits each time. `render.tonemap` turns light into a picture: "filmic" for `lit` and `volume`, "straight"
 for `ink`.
 """
 
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, denoise, lic, march, sheet, studio, surface
+from render import backend, denoise, lic, march, mitsuba_shapes, smoke_slab, studio
 
 # The lit sheet. Lengths are shares of the picture's height, so a scene looks the same at any width.
 THICKNESS = 0.075  # about the size of one motif
@@ -26,8 +26,8 @@ DENSITY_POWER = 1.3  # above 1: thin smoke is thinner than linear, and edges rea
 BODY = 0.035  # blur radius of the plume's body
 DETAIL = ((0.006, 0.2), (0.02, 0.3))  # of its detail, fine and coarse, and the relief each may add or take
 DETAIL_GAIN = 3.0  # of small differences of density
-KEY = sheet.Lamp(sheet.directions(125.0, 12.0, 3), slope=2.2, density=1.6)  # from the upper left, in front
-RIM = sheet.Lamp(sheet.directions(30.0, 12.0, 2), slope=1.2, density=0.8, behind=True)  # from the right
+KEY = smoke_slab.Lamp(smoke_slab.directions(125.0, 12.0, 3), slope=2.2, density=1.6)  # from the upper left, in front
+RIM = smoke_slab.Lamp(smoke_slab.directions(30.0, 12.0, 2), slope=1.2, density=0.8, behind=True)  # from the right
 KEY_LIGHT = np.array([1.00, 0.92, 0.82], np.float32) * 1.36  # warm
 RIM_LIGHT = np.array([0.45, 0.68, 1.00], np.float32) * 1.04  # cool
 SKY_LIGHT = np.array([0.42, 0.50, 0.66], np.float32) * 0.16  # from the front, everywhere
@@ -96,7 +96,7 @@ def _in_plane(rho: np.ndarray, towards: Iterable[tuple[float, float]], density: 
               least: float) -> np.ndarray:
     """Share (Y, X) of a light left after the smoke's whole width: the large shadow of the plume on itself."""
     sigma = rho * np.float32(density / rho.shape[0])
-    shares = np.stack([np.exp(-sheet.depth_towards(sigma, d)) for d in towards])
+    shares = np.stack([np.exp(-smoke_slab.depth_towards(sigma, d)) for d in towards])
     return np.asarray(least + (1.0 - least) * shares.mean(axis=0))
 
 
@@ -119,13 +119,13 @@ def lit(density: np.ndarray, width: int) -> np.ndarray:
     density = checked_density(density, 2)
     height = lic.height_for(density.shape, width)
     rho = lic.resampled(density, height, width)  # linear: cubic leaves dark halos
-    layer = THICKNESS * height / sheet.LAYERS
-    seen = sheet.light(OPTICAL_DEPTH * rho**np.float32(DENSITY_POWER), _relief(rho), layer, (KEY, RIM),
+    layer = THICKNESS * height / smoke_slab.LAYERS
+    seen = smoke_slab.light(OPTICAL_DEPTH * rho**np.float32(DENSITY_POWER), _relief(rho), layer, (KEY, RIM),
                        cone=round(0.006 * height))
-    key = seen.lamps[0] * _in_plane(rho, sheet.directions(125.0, 20.0, 3), 6.0, 0.12)
-    rim = seen.lamps[1] * _in_plane(rho, sheet.directions(30.0, 20.0, 3), 9.0, 0.05)
-    sky = seen.sky * _in_plane(rho, sheet.directions(90.0, 60.0, 3), 2.0, 0.3)
-    shadow = _blurred(sheet.moved(seen.passed, -0.05 * height, 0.06 * height, 1.0), 0.03 * height)
+    key = seen.lamps[0] * _in_plane(rho, smoke_slab.directions(125.0, 20.0, 3), 6.0, 0.12)
+    rim = seen.lamps[1] * _in_plane(rho, smoke_slab.directions(30.0, 20.0, 3), 9.0, 0.05)
+    sky = seen.sky * _in_plane(rho, smoke_slab.directions(90.0, 60.0, 3), 2.0, 0.3)
+    shadow = _blurred(smoke_slab.moved(seen.passed, -0.05 * height, 0.06 * height, 1.0), 0.03 * height)
     light = seen.passed[..., None] * _backdrop(height, width) * (0.35 + 0.65 * shadow)[..., None]
     light += key[..., None] * KEY_LIGHT + rim[..., None] * RIM_LIGHT + sky[..., None] * SKY_LIGHT
     return light[::-1].copy()
@@ -341,7 +341,7 @@ def _studio(mi: Any, bowl: tuple[float, float] | None,
     for name, box in studio.LAMPS.items():
         if name not in lights:
             continue
-        scene[name] = surface.lamp(mi, box)
+        scene[name] = mitsuba_shapes.lamp(mi, box)
     if bowl:
         scene["bowl"] = _mesh(mi, "bowl", studio.bowl(*bowl), studio.BOWL_COLOUR)
     return scene

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, surface
+from render import backend, mitsuba_shapes
 from synth.noise import gradient_noise
 
 Colour = tuple[float, float, float]
@@ -117,7 +117,7 @@ def floor(mi: Any) -> Any:
     """The sand, as a shape."""
     paint = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {
         "type": "mesh_attribute", "name": "vertex_color"}}}
-    return surface.shape(mi, "sand", *sand(), paint)
+    return mitsuba_shapes.shape(mi, "sand", *sand(), paint)
 
 
 @functools.cache

@@ -20,11 +20,11 @@ HOMES = {
     "OpenImageIO": {"pipeline/files/pictures.py", "render/layout.py"},  # files and FLIP; letters in a picture
     "av": {"pipeline/files/video.py"},
     "trimesh": {"pipeline/files/meshes.py"},
-    "pymeshlab": {"pipeline/files/mending.py"},
+    "pymeshlab": {"pipeline/files/mesh_repair.py"},
     "cv2": {"synth/motion/exemplar.py", "synth/elements/exemplar.py"},
     "svgpathtools": {"synth/motion/exemplar.py"},
     "mujoco": {"synth/elements/simulation.py"},
-    "pxr": {"pipeline/files/stage.py"},
+    "pxr": {"pipeline/files/usd.py"},
     "rlic": {"render/lic.py"},
     "threadpoolctl": {"synth/motion/neighborhood.py", "synth/elements/assignment.py"},
     "cyclopts": {"pipeline/cli.py"},

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import BadInput, StorageFailed
-from pipeline.files import atomic, shelter
+from pipeline.files import atomic, sandbox
 from synth.field import Field
 
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # red, green, blue, white: x, y
@@ -138,7 +138,7 @@ def read_foreign_field(path: Path, key: str) -> Field:
     channels than x, y (a vector field) or Y (a scalar one), for NaN or infinity, and for a missing or damaged
     file.
     """
-    return _field(path, key, shelter.read(_channels, path, key))
+    return _field(path, key, sandbox.read(_channels, path, key))
 
 
 def _field(path: Path, key: str, found: dict[str, Any]) -> Field:

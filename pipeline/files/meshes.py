@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import BadInput, StorageFailed
-from pipeline.files import atomic, shelter
+from pipeline.files import atomic, sandbox
 
 
 def write(path: Path, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray | None = None) -> None:
@@ -107,7 +107,7 @@ def read(path: Path, key: str) -> tuple[np.ndarray, np.ndarray]:
 
     `key` is the scene's, for the error. Raises `BadInput` if the file is missing or damaged or holds no mesh.
     """
-    found = shelter.read(_parsed, path, key)
+    found = sandbox.read(_parsed, path, key)
     try:
         _require_mesh(found["vertices"], found["faces"])
     except ValueError as error:
@@ -131,7 +131,7 @@ def read_solid(path: Path, key: str, pitch: float, centre: Sequence[float] | Non
     A mesh that is not watertight is mended. `key` is the scene's, for the error. Raises `BadInput` if the file is
     missing or damaged, holds no mesh or one that encloses nothing, or would fill more than MOST_VOXELS voxels.
     """
-    found = shelter.read(_voxels, path, key, pitch, centre, height, seconds=SECONDS)
+    found = sandbox.read(_voxels, path, key, pitch, centre, height, seconds=SECONDS)
     return found["voxels"].astype(bool), tuple(found["origin"])
 
 
@@ -139,7 +139,7 @@ def _voxels(path: Path, pitch: float, centre: Sequence[float] | None, height: fl
     """Runs in the child: see `read_solid`."""
     import trimesh
 
-    from pipeline.files import mending
+    from pipeline.files import mesh_repair
 
     kind = path.suffix.lower().removeprefix(".")
     if kind not in FORMATS:
@@ -151,7 +151,7 @@ def _voxels(path: Path, pitch: float, centre: Sequence[float] | None, height: fl
         raise ValueError("holds no mesh")
     _require_mesh(np.asarray(vertices), np.asarray(faces))
     if not mesh.is_watertight:
-        mesh = trimesh.Trimesh(*mending.closed(mesh.vertices, mesh.faces))
+        mesh = trimesh.Trimesh(*mesh_repair.closed(mesh.vertices, mesh.faces))
     volume = float(np.abs(np.einsum("ij,ij->i", *_corners(mesh)).sum())) / 6 if len(mesh.faces) > 3 else 0.0
     if not mesh.is_watertight or not volume > 1e-9 * float(np.prod(mesh.extents)):
         raise ValueError("is not watertight and cannot be mended: it encloses nothing")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import BadInput, StorageFailed
-from pipeline.files import atomic, shelter
+from pipeline.files import atomic, sandbox
 
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709, of sRGB values
 LARGEST = 16384  # pixels along a side of a stranger's picture
@@ -97,7 +97,7 @@ def read_foreign(path: Path, key: str) -> np.ndarray:
     or cut short.
     """
     try:
-        return _picture(shelter.read(_pixels, path, key)["pixels"])
+        return _picture(sandbox.read(_pixels, path, key)["pixels"])
     except ValueError as error:
         raise BadInput(path, key, str(error)) from error
 
@@ -135,9 +135,9 @@ def flip(reference: np.ndarray, test: np.ndarray) -> np.ndarray:
     """The visible difference (h, w), 0 to 1, of two sRGB pictures (h, w, 3): FLIP, 67 pixels a degree."""
     import OpenImageIO as oiio
 
-    from render import film
+    from render import tonemap
 
-    linear = [oiio.ImageBuf(np.ascontiguousarray(film.decoded(p), dtype=np.float32)) for p in (reference, test)]
+    linear = [oiio.ImageBuf(np.ascontiguousarray(tonemap.from_srgb(p), dtype=np.float32)) for p in (reference, test)]
     result = oiio.ImageBufAlgo.FLIP_diff(*linear, hdr=0, ppd=67.0)
     if result.has_error:
         raise ValueError(f"FLIP: {_first_line(result.geterror())}")

@@ -8,10 +8,10 @@ What a user may bring (`read_foreign`), in any unit, as it stands; y is up:
                       long: columns named frame, element, x, y and perhaps z, in any order, one row for each sample;
                       with a column sample the elements are threads, with row and column they are sheets; other
                       columns are passed over
-    shoal/            a folder of one PLY or OBJ file per frame: points, threads or sheets (`polygons.elements` says
+    school/            a folder of one PLY or OBJ file per frame: points, threads or sheets (`polygons.elements` says
                       how); each frame holds the same vertices in the same order
-    shoal.####.ply    the same by a name: # stands for digits, * for anything; the last number of a name is its frame
-    shoal.ply         one frame
+    school.####.ply    the same by a name: # stands for digits, * for anything; the last number of a name is its frame
+    school.ply         one frame
     noodles.usdc      OpenUSD (usd, usda, usdc): points, basis curves or meshes that are grids, over its time codes
     noodles.npz       our own
 
@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import BadInput, StorageFailed
-from pipeline.files import atomic, polygons, shelter, stage
+from pipeline.files import atomic, polygons, sandbox, usd
 from synth.elements.samples import Elements
 
 TABLES = ("csv", "tsv", "txt")
@@ -167,17 +167,17 @@ def read_foreign(path: Path, key: str, *, rate: float | None = None, otherwise: 
     if kind in polygons.FORMATS:
         names = [str(file.resolve()) for file in files]
         seconds = SECONDS + SECONDS_PER_FILE * len(files) + size / 1e6
-        found = shelter.read(_sequence, files[0], key, names, seconds=seconds)
+        found = sandbox.read(_sequence, files[0], key, names, seconds=seconds)
     elif len(files) > 1:
         raise BadInput(path, key, "a sequence is of PLY or OBJ files")
     elif kind in TABLES:
-        found = shelter.read(_table, path, key, dimensions, seconds=SECONDS + size / 2e5)
-    elif kind in stage.FORMATS:
-        found = shelter.read(_stage, path, key, prim)
+        found = sandbox.read(_table, path, key, dimensions, seconds=SECONDS + size / 2e5)
+    elif kind in usd.FORMATS:
+        found = sandbox.read(_stage, path, key, prim)
     elif kind == "npz":
-        found = shelter.read(_arrays, path, key)
+        found = sandbox.read(_arrays, path, key)
     else:
-        formats = ", ".join((*TABLES, *polygons.FORMATS, *stage.FORMATS))
+        formats = ", ".join((*TABLES, *polygons.FORMATS, *usd.FORMATS))
         raise BadInput(path, key, f"is no file of element tracks: {formats} or npz")
     if "fault" in found:
         raise BadInput(found["file"], key, found["fault"])
@@ -228,7 +228,7 @@ def _sequence(path: Path, names: Sequence[str]) -> dict[str, Any]:
 
 def _stage(path: Path, prim: str) -> dict[str, Any]:
     """The same of a USD file, and its rate."""
-    vertices, lines, faces, rate = stage.geometry(path, prim)
+    vertices, lines, faces, rate = usd.geometry(path, prim)
     order, grid = polygons.elements(polygons.Shape(vertices[0], lines, faces))
     return {"positions": vertices[:, order], "grid": grid, "rate": rate}
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import StorageFailed
-from pipeline.files import atomic, shelter
+from pipeline.files import atomic, sandbox
 from pipeline.files.pictures import LUMA, as_bytes
 
 MOST_FRAMES = 1000  # of a stranger's clip
@@ -105,5 +105,5 @@ def read_grey(path: Path, key: str) -> np.ndarray:
     `key` is the scene's, for the error. Raises `BadInput` if it is missing or damaged, or has fewer than two
     frames.
     """
-    frames = shelter.read(_frames, path, key)["frames"]
+    frames = sandbox.read(_frames, path, key)["frames"]
     return np.ascontiguousarray((frames.astype(np.float32) / 255 @ LUMA)[:, ::-1])

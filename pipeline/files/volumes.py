@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import BadInput, StorageFailed
-from pipeline.files import atomic, shelter
+from pipeline.files import atomic, sandbox
 from synth.field import Field
 
 SHAPE = "flowloom_shape"  # grid metadata: cells along x, y, z
@@ -127,7 +127,7 @@ def read_foreign(path: Path, name: str) -> Field:
 
     Raises `BadInput`: no such file or grid, damaged, not read here (see above), NaN or infinity.
     """
-    grid = shelter.read(_grid, path, name, name)
+    grid = sandbox.read(_grid, path, name, name)
     try:
         return _field(grid)
     except ValueError as error:
@@ -140,7 +140,7 @@ def read_level_set(path: Path, name: str, key: str) -> Field:
 
     Raises `BadInput`: no such file or grid, no level set, damaged, not read here (see above), NaN or infinity.
     """
-    grid = shelter.read(_grid, path, key, name, LEVEL_SET)
+    grid = sandbox.read(_grid, path, key, name, LEVEL_SET)
     try:
         return _field(grid)
     except ValueError as error:

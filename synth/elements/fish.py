@@ -86,7 +86,7 @@ def bodies(position: np.ndarray, heading: np.ndarray, length: np.ndarray, colour
     length    (E,), colour (E, 3) sRGB in [0, 1]: of the flanks
     phase     (E,) radians: of the tail's beat
     turn      (E,) radians from nose to tail, positive to the left
-    detail    1 for a shoal; 2 and more for fish that are looked at
+    detail    1 for a school; 2 and more for fish that are looked at
     """
     shape = _template(detail)
     ahead, left, up = _upright(np.asarray(heading, float), np.asarray(turn, float))

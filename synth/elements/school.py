@@ -1,11 +1,11 @@
-"""Shoals: exemplars of fish that swim together (ma13 figures 9 and 11).
+"""Schools: exemplars of fish that swim together (ma13 figures 9 and 11).
 
-    homogeneous  one shoal, everywhere alike (figure 9a)
+    homogeneous  one school, everywhere alike (figure 9a)
     crossing     groups side by side, between which some fish dart (9c, "temporally heterogeneous")
     mixed        a few large fish among small ones (9e, "spatially heterogeneous")
     tracked      fish whose tracks were taken from a film (11a)
 
-Each returns its elements and the shoal's speed, world units per second. The shoal swims along +x, and its mean motion
+Each returns its elements and the school's speed, world units per second. The school swims along +x, and its mean motion
 is taken out of the positions: they are those in a frame that swims with it, in which fish only drift. To see them swim,
 add speed × time to x. No simulated fish drifts back as fast as the frame swims: none swims backwards (§7). y is up.
 
@@ -60,7 +60,7 @@ class _School:
 
 def homogeneous(count: int = 40, frames: int = 60, *, spacing: float = 1.0, speed: float = 2.2, rate: float = 24.0,
                 seed: int = 0) -> tuple[Elements, float]:
-    """A shoal that is everywhere alike (ma13 figure 9a): count fish in a box that repeats.
+    """A school that is everywhere alike (ma13 figure 9a): count fish in a box that repeats.
 
     spacing  about the distance of a fish from its nearest, world units; speed in spacings per second
     Raises ValueError for fewer than 8 fish, fewer than 2 frames, or a speed at which fish may swim backwards.
@@ -150,7 +150,7 @@ def mixed(count: int = 44, large: int = 3, frames: int = 60, *, size: float = 3.
 
 def _check(count: int, frames: int, spacing: float, speed: float, rate: float, slowest: float = 1.5) -> None:
     if count < 8 or frames < 2:
-        raise ValueError(f"a shoal has 8 fish or more over 2 frames or more, not {count} over {frames}")
+        raise ValueError(f"a school has 8 fish or more over 2 frames or more, not {count} over {frames}")
     for name, value in (("spacing", spacing), ("rate", rate)):
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"{name} = {value} is not above 0")
@@ -265,8 +265,8 @@ def tracked(tracks: np.ndarray, rate: float, *, spacing: float = 1.0, length: fl
     length     of a fish, in spacings
     smoothing  frames, odd, of the window in which a track is a cubic polynomial (Savitzky and Golay)
     A tracker's steps of a pixel are smoothed, and the mean motion taken out: positions are those in a frame that moves
-    with the shoal's middle and turns with its heading, x ahead and y to its left.
-    Raises ValueError for tracks of one fish, of fewer frames than the window, with gaps, or of a shoal at rest.
+    with the school's middle and turns with its heading, x ahead and y to its left.
+    Raises ValueError for tracks of one fish, of fewer frames than the window, with gaps, or of a school at rest.
     """
     pixels = np.asarray(tracks, np.float64)
     if pixels.ndim != 3 or pixels.shape[2] != 2 or pixels.shape[1] < 2:
@@ -282,11 +282,11 @@ def tracked(tracks: np.ndarray, rate: float, *, spacing: float = 1.0, length: fl
         raise ValueError(f"frame {gap[0][0] + 1}, element {gap[0][1] + 1} is not finite")
     smooth = signal.savgol_filter(pixels * [1, -1], smoothing, 3, axis=0)
     middle = smooth.mean(1)
-    # the heading is that of the shoal as a whole: not of each swerve
+    # the heading is that of the school as a whole: not of each swerve
     velocity = ndimage.gaussian_filter1d(np.gradient(middle, axis=0), smoothing / 2, axis=0, mode="nearest")
     pace = np.linalg.norm(velocity, axis=1)
     if not pace.mean() > 1e-3:
-        raise ValueError("the tracked shoal is at rest: it has no direction in which it swims")
+        raise ValueError("the tracked school is at rest: it has no direction in which it swims")
     ahead = velocity / np.maximum(pace, 1e-9)[:, None]
     offset = smooth - middle[:, None]
     own = np.stack([(offset * ahead[:, None]).sum(-1),

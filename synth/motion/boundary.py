@@ -64,7 +64,7 @@ def walls(distance: np.ndarray, levels: int, margin: int, target: np.ndarray | N
 def into_frame(normal: np.ndarray, frame: np.ndarray) -> np.ndarray:
     """R^T n: normals (K, D) of the domain in the exemplar's coordinates.
 
-    frame  (K, 2) the local x axes of a plane (`synth.motion.frames`), or matrices (K, D, D) whose columns are the
+    frame  (K, 2) the local x axes of a plane (`synth.motion.local_axes`), or matrices (K, D, D) whose columns are the
            local axes
     """
     if frame.ndim == 3:

@@ -21,7 +21,7 @@ from synth.advect import departure
 from synth.motion import assignment, initialize, neighborhood
 from synth.motion.assignment import Assigner
 from synth.motion.boundary import Constraint, walls
-from synth.motion.frames import local_frame
+from synth.motion.local_axes import local_frame
 from synth.motion.search import Matcher
 
 # each level is synthesized on the domain grown by this many cells, the radius of the widest neighbourhood, so

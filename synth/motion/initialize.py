@@ -10,7 +10,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from synth import opencl
-from synth.motion.frames import block_means
+from synth.motion.local_axes import block_means
 
 RELAXATIONS = 15
 # tiles laid per exemplar area: squares that turn do not pack without gaps, and some tiles die out

@@ -14,7 +14,7 @@ from scipy import ndimage
 from synth import opencl
 from synth.motion.neighborhood import Space, exemplar_patches
 from synth.motion.search import Matcher
-from synth.motion.solid import Eye, Settings, View, on_device, site_grid
+from synth.motion.synthesis_3d import Eye, Settings, View, on_device, site_grid
 
 RADIUS = 4
 # an exemplar neighbourhood weaker than this share of the exemplar's rms shows nothing that could be missed

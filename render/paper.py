@@ -1,0 +1,84 @@
+"""Paper in the air and on the floor: light comes through it, and its shadows are soft.
+
+`picture` path-traces sheets with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row first;
+`inset` does the same with an exemplar, held in the middle of the picture. `render.tonemap` tones both ("filmic").
+
+World units: floor at y = 0, the scene about one unit high, centred on x = z = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from render import backend, mitsuba_shapes, studio, tonemap
+
+CAMERA = studio.Camera(position=(0.0, 0.74, 5.4), target=(0.0, 0.46, 0.0), fov=12.2)
+SUN = studio.Softbox((-3.4, 3.0, -0.9), (0.0, 0.4, 0.0), (1.2, 1.2), (94.0, 84.0, 70.0), 1.0)  # high, left, behind
+FILL = studio.Softbox((3.4, 1.6, 3.4), (0.0, 0.4, 0.0), (3.2, 2.8), (1.3, 1.45, 1.7), 0.5)
+AIR = (0.22, 0.23, 0.25)  # radiance from everywhere
+BACKDROP = (0.355, 0.36, 0.365)
+CLEAR = 0.2  # between an inset's sheets and its floor
+BOUNCES = 1
+PALETTE = ((0.965, 0.955, 0.930), (0.925, 0.905, 0.850), (0.905, 0.430, 0.330), (0.970, 0.780, 0.380),
+           (0.330, 0.560, 0.620))
+"""Colours that go together, sRGB: white, cream, vermilion, amber, petrol."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How `picture` looks at paper: size in pixels, paths per pixel, seed."""
+
+    width: int = 960
+    height: int = 540
+    spp: int = 64
+    seed: int = 1
+    camera: studio.Camera = CAMERA
+
+
+def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settings: Settings = Settings(),
+            ) -> np.ndarray:
+    """Sheets of paper before a pale backdrop: linear light (height, width, 3).
+
+    vertices (N, 3) float32, world units; faces (M, 3) int, sheets of one layer; colours (N, 3) uint8, sRGB.
+    """
+    vertices, camera, _ = studio.in_studio(vertices, settings.camera, CAMERA)
+    return _traced(vertices, faces, colours, replace(settings, camera=camera), 0.0)
+
+
+def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,
+          settings: Settings = Settings()) -> np.ndarray:
+    """An exemplar's sheets in the air, as `picture` shows them; the box from `low` to `high` (3,), which holds them
+    in all frames, fills the picture."""
+    aspect = settings.width / settings.height
+    box = studio.placed(np.stack([low, high]), low, high, settings.camera, aspect)
+    placed = studio.placed(vertices, low, high, settings.camera, aspect)
+    return _traced(placed, faces, colours, settings, min(0.0, float(box[0, 1]) - CLEAR))
+
+
+def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settings: Settings,
+            level: float) -> np.ndarray:
+    """Sheets over a floor at y = level."""
+    backdrop = studio.backdrop()
+    ground = studio.Mesh(backdrop.vertices + np.array([0.0, level, 0.0], np.float32), backdrop.faces)
+    mi = backend.mitsuba("llvm_ad_rgb")
+    scene = mi.load_dict({
+        "type": "scene",
+        "sensor": mitsuba_shapes.sensor(mi, settings.camera, settings.width, settings.height),
+        "sun": mitsuba_shapes.lamp(mi, SUN), "fill": mitsuba_shapes.lamp(mi, FILL),
+        "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}},
+        "paper": mitsuba_shapes.shape(mi, "paper", vertices, faces, tonemap.from_srgb(colours / 255.0), paper()),
+        "backdrop": mitsuba_shapes.plain(mi, "backdrop", ground, {"type": "twosided", "bsdf": {
+            "type": "diffuse", "reflectance": {"type": "rgb", "value": list(BACKDROP)}}}),
+    })
+    light = mi.render(scene, integrator=mitsuba_shapes.every_lamp(mi, BOUNCES), spp=settings.spp,
+                      seed=settings.seed)
+    return np.array(light, np.float32)
+
+
+def paper() -> dict[str, Any]:
+    """A sheet that sends a third of the light that it does not keep through."""
+    return {"type": "principledthin", "base_color": {"type": "mesh_attribute", "name": "vertex_color"},
+            "roughness": 0.65, "diff_trans": 0.92, "eta": 1.35, "spec_trans": 0.0}

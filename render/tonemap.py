@@ -1,0 +1,71 @@
+"""From light to picture: the tone curve, the sRGB transfer function, and eight bits without banding.
+
+Renderers return linear Rec.709 light. Nothing is toned before this module, which a figure calls last.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Literal
+
+import numpy as np
+
+Curve = Literal["filmic", "straight"]
+
+
+def filmic(light: np.ndarray) -> np.ndarray:
+    """Linear light toned to [0, 1): a soft toe, a straight middle, a long shoulder that never clips.
+
+    The rational fit of the ACES reference curve by Narkowicz (2015), as published.
+    """
+    x = np.maximum(light, 0.0)
+    return np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0)
+
+
+def to_srgb(linear: np.ndarray) -> np.ndarray:
+    """The sRGB transfer function (IEC 61966-2-1) of linear values in [0, 1]; values outside are clipped."""
+    x = np.clip(linear, 0.0, 1.0)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+
+
+def from_srgb(display: np.ndarray) -> np.ndarray:
+    """The inverse of `to_srgb`: the linear values that it shows as these in [0, 1]."""
+    return np.where(display <= 0.04045, display / 12.92, ((np.maximum(display, 0.04045) + 0.055) / 1.055) ** 2.4)
+
+
+def to_display(light: np.ndarray, curve: Curve) -> np.ndarray:
+    """Linear light (h, w, 3) as sRGB display values (h, w, 3) float32 in [0, 1].
+
+    "filmic" for lit smoke and volumes; "straight" (no tone curve) for ink, whose paper must stay white.
+    """
+    toned = filmic(light) if curve == "filmic" else light
+    return to_srgb(toned).astype(np.float32)
+
+
+def eight_bit(display: np.ndarray, seed: int = 0) -> np.ndarray:
+    """Display values (h, w, 3) in [0, 1] as uint8, dithered by triangular noise of one step each way.
+
+    Without the noise a soft gradient shows bands. The noise depends on `seed` and shape only, so it stands
+    still in an animation. Exact black and exact white stay exact.
+    """
+    display = np.clip(display, 0.0, 1.0)
+    noise = np.where((display == 0.0) | (display == 1.0), np.float32(0.0), _triangular(display.shape, seed))
+    return np.clip(np.rint(display * 255.0 + noise), 0, 255).astype(np.uint8)
+
+
+@functools.lru_cache(maxsize=8)  # the same in every frame
+def _triangular(shape: tuple[int, ...], seed: int) -> np.ndarray:
+    """Noise between -1 and 1, the difference of two uniform numbers."""
+    rng = np.random.Generator(np.random.Philox(key=seed))
+    return np.asarray(rng.random(shape, dtype=np.float32) - rng.random(shape, dtype=np.float32))
+
+
+def oklab_to_linear(oklab: np.ndarray) -> np.ndarray:
+    """Oklab (..., 3) (Ottosson 2020) as linear Rec.709, unclipped."""
+    to_cones = np.array([[1.0, 0.3963377774, 0.2158037573],
+                         [1.0, -0.1055613458, -0.0638541728],
+                         [1.0, -0.0894841775, -1.2914855480]])
+    to_rgb = np.array([[4.0767416621, -3.3077115913, 0.2309699292],
+                       [-1.2684380046, 2.6097574011, -0.3413193965],
+                       [-0.0041960863, -0.7034186147, 1.7076147010]])
+    return (oklab @ to_cones.T) ** 3 @ to_rgb.T

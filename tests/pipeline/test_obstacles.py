@@ -1,0 +1,326 @@
+"""The obstacles of a scene: what each kind becomes, what is refused in one line, and who hears of them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import cli, obstacles
+from pipeline.errors import BadInput
+from pipeline.files import images, meshes, pictures, volumes
+from pipeline.scene import load
+from synth import obstacle
+from synth.field import Field, domain_origin
+from synth.motion.local_axes import local_frame, to_world
+from synth.projection import divergence
+
+SCENE = """\
+title = "A tiny river"
+frames = 2
+[exemplar]
+kind = "sinusoid"
+size = 8
+[coarse]
+COARSE
+[detail]
+size = SIZE
+iterations = 1
+neighborhoods = [5]
+OBSTACLES
+[combine]
+omega = 0.5
+[particles]
+count = 60
+[render]
+kind = "RENDER"
+width = 32
+[figure]
+panels = ["detail", "combined"]
+panel = 32
+"""
+BALL = '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.2'
+ANALYTIC = 'kind = "analytic"\nsize = [16, 12]'
+WAKE = 'kind = "wake"\nsize = [32, 24]'
+
+
+def written(text: str = BALL, coarse: str = ANALYTIC, size: str = "[32, 24]", render: str = "none") -> Path:
+    """tiny.toml with these obstacles."""
+    content = SCENE.replace("COARSE", coarse).replace("SIZE", size).replace("OBSTACLES", text)
+    if render == "particles":
+        content = content.replace("width = 32", "width = 32\nspp = 1").replace('"combined"]', '"combined", "result"]')
+    Path("tiny.toml").write_text(content.replace("RENDER", render))
+    return Path("tiny.toml")
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Each test works in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def solid(text: str, size: str = "[32, 24]", coarse: str = ANALYTIC) -> np.ndarray:
+    """The distance, in cells, that a scene with these obstacles works with."""
+    (scene,) = load(written(text, size=size, coarse=coarse)).variants.values()
+    ((_, field),) = obstacles.make_solid(scene, None, [0])
+    assert field.shape == scene.shape and field.origin == domain_origin(scene.shape)
+    return field.values * scene.shape[-2]
+
+
+def level_set(name: str = "surface", of_class: str = "level set", values: np.ndarray | None = None) -> Path:
+    """ball.vdb: a ball of 0.2 round (0, 0.5, 0), written as a level set of an origin of its own."""
+    origin, voxel = (-0.43, -0.11, -0.37), 0.03
+    z, y, x = np.meshgrid(*(o + voxel * np.arange(n) for o, n in zip(origin[::-1], (25, 41, 30), strict=True)),
+                          indexing="ij")
+    distance = np.sqrt(x * x + (y - 0.5) ** 2 + z * z) - 0.2 if values is None else values
+    volumes.write(Path("ball.vdb"), {name: Field(distance.astype(np.float32), voxel, origin)},
+                  level_set=of_class == "level set")
+    return Path("ball.vdb")
+
+
+def near(one: np.ndarray, other: np.ndarray) -> float:
+    """The largest difference of two distances close to the wall of the other."""
+    return float(np.abs(one - other)[np.abs(other) < 1.5].max())
+
+
+def test_shapes_are_themselves() -> None:
+    assert np.allclose(solid(BALL), obstacle.ball((24, 32), (0, 0.5), 0.2).distance, atol=1e-5)
+    box = '[[obstacles]]\nkind = "box"\ncentre = [0.1, 0.5]\nradius = [0.2, 0.1]\nangle = 30'
+    assert np.allclose(solid(box), obstacle.box((24, 32), (0.1, 0.5), (0.2, 0.1), 30).distance, atol=1e-5)
+    square = '[[obstacles]]\nkind = "box"\ncentre = [0.1, 0.5]\nradius = 0.2'
+    both = np.minimum(solid(BALL), solid(square))
+    assert np.allclose(solid(f"{BALL}\n{square}"), both, atol=1e-5)
+
+
+def test_in_space_too() -> None:
+    ball = BALL.replace("0.5]", "0.5, 0.1]")
+    flow = 'kind = "analytic"\nsize = [16, 12, 8]'
+    made = solid(ball, "[32, 24, 16]", flow)
+    assert np.allclose(made, obstacle.ball((16, 24, 32), (0, 0.5, 0.1), 0.2).distance, atol=1e-5)
+
+
+def test_a_picture_a_drawing_and_a_level_set_of_a_disc() -> None:
+    expected = obstacle.ball((24, 32), (0, 0.5), 0.2).distance
+    y, x = (np.mgrid[:120, :160] + 0.5) / 120
+    disc = np.hypot(x - 80 / 120, y - 0.5) < 0.2
+    pictures.write(Path("mask.png"), disc.astype(np.float32))
+    assert near(solid('[[obstacles]]\nkind = "mask"\nfile = "mask.png"'), expected) < 0.4
+    ring = disc & (np.hypot(x - 80 / 120, y - 0.5) > 0.17)
+    pictures.write(Path("ring.png"), 1 - ring.astype(np.float32))
+    assert near(solid('[[obstacles]]\nkind = "drawing"\nfile = "ring.png"'), expected) < 0.4
+    Path("disc.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 200 100">'
+                                '<circle cx="100" cy="50" r="20"/></svg>')
+    assert near(solid('[[obstacles]]\nkind = "drawing"\nfile = "disc.svg"'), expected) < 0.4
+    moved = '[[obstacles]]\nkind = "drawing"\nfile = "disc.svg"\ncentre = [0.1, 0.4]\nheight = 0.5'
+    assert near(solid(moved), obstacle.ball((24, 32), (0.1, 0.4), 0.1).distance) < 0.4
+    level_set()
+    assert near(solid('[[obstacles]]\nkind = "level-set"\nfile = "ball.vdb"'), expected) < 0.4
+
+
+def ball_mesh(name: str = "ball.ply", radius: float = 0.2, centre: tuple[float, ...] = (0, 0.5, 0), holes: int = 0,
+              ) -> Path:
+    """A ball as a mesh in a file, `holes` of its faces taken away."""
+    import trimesh
+
+    mesh = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+    mesh.apply_translation(centre)
+    mesh.update_faces(np.arange(len(mesh.faces)) % 150 >= (1 if holes else 0))
+    mesh.export(name)
+    return Path(name)
+
+
+@pytest.mark.parametrize("name", ["ball.ply", "ball.obj", "ball.stl"])
+@pytest.mark.parametrize("holes", [0, 1])
+def test_a_mesh_of_a_ball_and_one_that_is_mended(name: str, holes: int) -> None:
+    ball_mesh(name, holes=holes)
+    expected = obstacle.ball((24, 32), (0, 0.5), 0.2).distance
+    assert near(solid(f'[[obstacles]]\nkind = "mesh"\nfile = "{name}"'), expected) < 0.35
+
+
+def test_a_mesh_is_moved_and_scaled_and_stands_in_space() -> None:
+    ball_mesh(radius=30, centre=(100, -7, 55))
+    placed = '[[obstacles]]\nkind = "mesh"\nfile = "ball.ply"\ncentre = [0.1, 0.5, 0.05]\nheight = 0.5'
+    made = solid(placed, "[32, 24, 16]", 'kind = "analytic"\nsize = [16, 12, 8]')
+    assert near(made, obstacle.ball((16, 24, 32), (0.1, 0.5, 0.05), 0.25).distance) < 0.45
+
+
+def refused(text: str, capsys: pytest.CaptureFixture[str], **settings: str) -> str:
+    """The one line that running the scene ends with; nothing must have been written."""
+    written(text, **settings)
+    before = sorted(Path().rglob("*"))
+    assert cli.run(["figure", "tiny.toml"]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1, err
+    assert sorted(Path().rglob("*")) == before
+    return err.rstrip()
+
+
+@pytest.mark.parametrize(("text", "settings", "expected"), [
+    (BALL.replace("0.2", "3.0"), {}, "tiny.toml: obstacles: the obstacles fill the domain"),
+    (BALL.replace("0.0, 0.5", "3.0, 0.5"), {},
+     "obstacles: obstacle 1 lies outside the domain, or is smaller than a cell"),
+    (f"{BALL}\n{BALL.replace('0.2', '0.001')}", {}, "obstacles: obstacle 2 lies outside"),
+    (BALL.replace("0.5]", "0.5, 0.0]"), {}, "obstacles[0].centre: has 3 coordinates; detail.size is 32×24"),
+    (BALL.replace("0.2", "[0.2, 0.1]"), {}, "obstacles[0].radius: has 2 numbers for a ball"),
+    (BALL.replace("ball", "bal"), {}, "obstacles[0].kind: unknown kind 'bal'; did you mean ball?"),
+    (BALL.replace("radius = 0.2", "radius = -0.2"), {}, "obstacles[0].radius[0]: should be greater than 0"),
+    ("", {"coarse": WAKE}, "coarse.kind: \"wake\" needs a stone"),
+    (BALL, {"coarse": WAKE + "\ngains = [0.1]"}, "coarse.gains: 1 gains for 3 lengths"),
+    ('samples = "lagrangian"\n' + BALL, {}, "detail.samples: samples that move do not observe a boundary"),
+])
+def test_what_no_scene_can_have(capsys: pytest.CaptureFixture[str], text: str, settings: dict[str, str],
+                                expected: str) -> None:
+    assert expected in refused(text, capsys, **settings)
+
+
+@pytest.mark.parametrize("how", ["missing", "empty", "cut short", "text"])
+@pytest.mark.parametrize(("kind", "name"), [
+    ("mask", "a.png"), ("drawing", "a.png"), ("drawing", "a.svg"), ("level-set", "ball.vdb"), ("mesh", "ball.ply")])
+def test_a_spoilt_file(capsys: pytest.CaptureFixture[str], kind: str, name: str, how: str) -> None:
+    match name:
+        case "a.png":
+            pictures.write(Path(name), obstacle.outlines([np.array([[0.2, 0.2], [0.8, 0.2], [0.5, 0.8]])], (40, 40)))
+        case "a.svg":
+            Path(name).write_text('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><circle r="2"/></svg>')
+        case "ball.ply":
+            ball_mesh()
+        case _:
+            level_set()
+    content = Path(name).read_bytes()
+    Path(name).unlink()
+    if how != "missing":
+        Path(name).write_bytes({"empty": b"", "cut short": content[:len(content) // 2], "text": b"nothing"}[how])
+    line = refused(f'[[obstacles]]\nkind = "{kind}"\nfile = "{name}"', capsys)
+    assert name in line and "obstacles[0].file" in line
+
+
+def test_pictures_and_volumes_that_are_no_obstacle(capsys: pytest.CaptureFixture[str]) -> None:
+    pictures.write(Path("black.png"), np.zeros((8, 8), np.float32))
+    pictures.write(Path("white.png"), np.ones((8, 16), np.float32))
+    assert "outside" in refused('[[obstacles]]\nkind = "mask"\nfile = "black.png"', capsys)
+    assert "fill the domain" in refused('[[obstacles]]\nkind = "mask"\nfile = "white.png"\nheight = 2', capsys)
+    assert "blank" in refused('[[obstacles]]\nkind = "drawing"\nfile = "white.png"', capsys)
+    Path("open.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0 L5 5 L9 0"/></svg>')
+    assert "encloses nothing" in refused('[[obstacles]]\nkind = "drawing"\nfile = "open.svg"', capsys)
+    level_set("density", "fog volume")
+    text = '[[obstacles]]\nkind = "level-set"\nfile = "ball.vdb"'
+    assert "no such grid" in refused(text, capsys)
+    assert "no level set, but of class fog volume" in refused(text + '\ngrid = "density"', capsys)
+
+
+def test_meshes_that_are_no_obstacle(capsys: pytest.CaptureFixture[str]) -> None:
+    text = '[[obstacles]]\nkind = "mesh"\nfile = "a.ply"'
+    meshes.write(Path("a.ply"), np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
+    line = refused(text, capsys)
+    assert "a.ply: obstacles[0].file: is not watertight and cannot be mended: it encloses nothing" in line
+    ball_mesh("a.ply", radius=500)
+    assert "give it a height" in refused(text, capsys)
+    ball_mesh("a.ply", centre=(9, 9, 9))
+    assert "obstacles: obstacle 1 lies outside" in refused(text, capsys)
+    ball_mesh("a.ply", radius=1.2)
+    assert "fill the domain" in refused(text, capsys)
+    meshes.write_points(Path("a.ply"), np.zeros((3, 3), np.float32), {})
+    assert "holds no mesh" in refused(text, capsys)
+
+
+def test_anisotropic_voxels_are_refused() -> None:
+    matrix = np.diag([0.1, 0.2, 0.1, 1.0]).ravel().tolist()
+    with pytest.raises(ValueError, match="anisotropic voxels"):
+        volumes._placement(matrix)
+
+
+@pytest.mark.parametrize("coarse", [ANALYTIC, WAKE, 'kind = "smoke"\nsize = [16, 12]\nwarmup = 5'])
+def test_the_whole_chain_keeps_to_the_wall(coarse: str) -> None:
+    written(BALL, coarse=coarse)
+    assert cli.run(["figure", "tiny.toml"]) == 0
+    out = Path("out/tiny")
+    away = images.read_field(out / "fields/solid.exr").values * 24
+    L, H = (images.read_field(out / f"fields/{name}.0002.exr") for name in ("L", "H"))
+    motion = L.per_frame(30).values
+    assert L.shape == (24, 32)  # past an obstacle L is on the cells of H
+    if "wake" not in coarse:
+        slope = np.sqrt(np.mean([np.gradient(motion, axis=a) ** 2 for a in (0, 1)]))
+        left = divergence(motion, "wall" if "smoke" in coarse else "open", away)
+        assert np.sqrt(np.mean(left**2)) < 1e-4 * slope
+    detail = to_world(H.values, local_frame(motion))
+    normal = obstacle.outward(away)
+    through = np.sum(detail * normal, -1)[np.abs(away) < 0.5]
+    assert np.sqrt(np.mean(through**2)) < 0.02 * np.sqrt(np.mean(H.values**2))
+
+
+def test_in_space_the_whole_chain_keeps_to_the_wall_and_hands_it_on_as_a_level_set() -> None:
+    written(BALL.replace("0.5]", "0.5, 0.0]"), coarse='kind = "analytic"\nsize = [12, 12, 8]', size="[24, 24, 16]")
+    assert cli.run(["figure", "tiny.toml"]) == 0
+    out = Path("out/tiny")
+    away = volumes.read(out / "fields/solid.vdb")["surface"]
+    assert volumes.read_level_set(out / "fields/solid.vdb", "surface", "key") == away
+    cells = away.values * 24
+    assert near(cells, obstacle.ball((16, 24, 24), (0, 0.5, 0), 0.2).distance) < 1e-4
+    L, F = (volumes.read(out / f"{name}.0002.vdb")["vel"].per_frame(30).values for name in ("fields/L", "geometry/F"))
+    detail = (F - L) / 0.5
+    slope = np.sqrt(np.mean([np.gradient(L, axis=a) ** 2 for a in range(3)]))
+    assert np.sqrt(np.mean(divergence(L, "open", cells) ** 2)) < 1e-4 * slope
+    through = np.sum(detail * obstacle.outward(cells), -1)[np.abs(cells) < 0.5]
+    assert np.sqrt(np.mean(through**2)) < 0.02 * np.sqrt(np.mean(np.sum(detail**2, -1)))
+
+
+def test_no_smoke_stands_inside_an_obstacle() -> None:
+    written(BALL, render="lit")
+    text = Path("tiny.toml").read_text()
+    Path("tiny.toml").write_text(text + "[density]\nm = 1\nsources = [{ centre = [0.0, 0.5], radius = 0.4 }]\n")
+    assert cli.run(["bake", "tiny.toml"]) == 0
+    density = images.read_field(Path("out/tiny/geometry/density.0002.exr")).values
+    fine = obstacle.ball((48, 64), (0, 0.5), 0.2).distance
+    assert not density[fine < -1].any() and density[(fine > 1) & (fine < 6)].mean() > 0.3
+
+
+def test_without_the_boundary_the_detail_goes_its_way() -> None:
+    written(BALL + "\n")
+    text = Path("tiny.toml").read_text().replace("iterations = 1", "iterations = 1\nboundary = false")
+    Path("tiny.toml").write_text(text)
+    assert cli.run(["figure", "tiny.toml"]) == 0
+    away = images.read_field(Path("out/tiny/fields/solid.exr")).values * 24
+    L, H = (images.read_field(Path(f"out/tiny/fields/{name}.0002.exr")) for name in ("L", "H"))
+    through = np.sum(to_world(H.values, local_frame(L.values)) * obstacle.outward(away), -1)[np.abs(away) < 0.5]
+    assert np.sqrt(np.mean(through**2)) > 0.1 * np.sqrt(np.mean(H.values**2))
+
+
+def test_projected_the_final_motion_is_free_of_divergence_past_the_obstacle() -> None:
+    written(BALL)
+    Path("tiny.toml").write_text(Path("tiny.toml").read_text().replace("omega = 0.5", "omega = 0.5\nproject = true"))
+    assert cli.run(["figure", "tiny.toml"]) == 0
+    away = images.read_field(Path("out/tiny/fields/solid.exr")).values * 24
+    F = images.read_field(Path("out/tiny/geometry/F.0002.exr")).per_frame(30).values
+    slope = np.sqrt(np.mean([np.gradient(F, axis=a) ** 2 for a in (0, 1)]))
+    assert np.sqrt(np.mean(divergence(F, "open", away) ** 2)) < 1e-4 * slope
+
+
+def test_particles_are_baked_drawn_and_resumed() -> None:
+    written(BALL, coarse=WAKE, render="particles")
+    text = Path("tiny.toml").read_text().replace("frames = 2", "frames = 4")
+    Path("tiny.toml").write_text(text)
+    assert cli.run(["figure", "tiny.toml"]) == 0
+    files = [Path(f"out/tiny/geometry/particles.{i:04d}.ply") for i in range(1, 5)]
+    points = [meshes.read_points(file) for file in files]
+    distance = obstacle.ball((24, 32), (0, 0.5), 0.2)
+    for found in points:
+        assert found["position"].shape == (60, 3) and not found["position"][:, 2].any()
+        assert np.hypot(found["position"][:, 0], found["position"][:, 1] - 0.5).min() > 0.2
+        assert set(found) == {"position", "vx", "vy", "vz", "age"}
+    assert distance.solid.any()
+    moved = points[1]["position"] - points[0]["position"]
+    same = (points[1]["age"] == points[0]["age"] + 1)
+    expected = 0.5 * (points[0]["vx"] + points[1]["vx"]) / 30
+    assert same.sum() > 40 and np.abs(moved[:, 0] - expected)[same].max() < 0.02
+    whole = [file.read_bytes() for file in files]
+    for file in files[2:]:
+        file.unlink()  # it goes on from the second frame, to the same bits
+    assert cli.run(["figure", "tiny.toml"]) == 0
+    assert [file.read_bytes() for file in files] == whole
+    assert images.read_picture(Path("out/tiny/images/beauty.0004.exr")).shape == (24, 32, 3)
+
+
+def test_a_bad_reader_is_blamed_by_its_key() -> None:
+    Path("latin.svg").write_bytes(b"<svg>\xe9</svg>")
+    with pytest.raises(BadInput, match=r"latin\.svg: key: is not an SVG document"):
+        obstacles._drawing(Path("latin.svg"), "key")
