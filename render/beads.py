@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, mitsuba_shapes, tonemap
+from render import backend, mitsuba_shapes, studio
 
 SLANT = (-0.42, 0.62, 1.0)  # towards the lamp: from the upper left
 LAMP = 0.34  # edge of the lamp over its distance: how soft shadows are
@@ -51,54 +51,38 @@ class Ground:
     origin: tuple[float, float] = (0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How `picture` looks at particles: its width in pixels, paths per pixel, seed."""
-
-    width: int = 960
-    spp: int = 64
-    seed: int = 1
-
-
 def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, ground: Ground,
-            settings: Settings = Settings()) -> np.ndarray:
-    """Particles on their ground from above: linear light (height, width, 3), its height by the ground's.
+            shot: studio.Shot) -> np.ndarray:
+    """Particles on their ground from above: linear light (height, width, 3).
 
-    vertices (N, 3) float32, world units, the plane at z = 0; faces (M, 3) int; colours (N, 3) uint8, sRGB.
+    vertices (N, 3) float32, world units, the plane at z = 0; faces (M, 3) int; colours (N, 3) uint8, sRGB
+    The height of the picture follows from the ground; the shot's height, time and camera are not used.
     """
     mi = backend.mitsuba("llvm_ad_rgb")
     low, high = np.array(ground.low, float), np.array(ground.high, float)
-    height = max(1, round(settings.width * (high[1] - low[1]) / (high[0] - low[0])))
+    height = max(1, round(shot.width * (high[1] - low[1]) / (high[0] - low[0])))
     # the picture becomes one unit high: lamp, bevels and shadows look the same at any scale
     scale = 1 / (high[1] - low[1])
     middle = np.array([*(low + high) / 2, 0.0])
-    transform = mi.ScalarTransform4f
     toward = np.array(SLANT) / np.linalg.norm(SLANT)
-    aspect = settings.width / height
-    glossy = {"type": "principled", "base_color": {"type": "mesh_attribute", "name": "vertex_color"},
-              "roughness": 0.42, "specular": 0.45, "clearcoat": 0.35, "clearcoat_gloss": 0.82}
+    glossy = {"type": "principled", "base_color": mitsuba_shapes.VERTEX_COLOUR, "roughness": 0.42, "specular": 0.45,
+              "clearcoat": 0.35, "clearcoat_gloss": 0.82}
     scene: dict[str, Any] = {
-        "type": "scene",
         "ground": _ground(mi, ground, height, scale, middle),
         "lamp": {
             "type": "rectangle",
-            "to_world": transform().look_at(origin=list(AWAY * toward), target=[0, 0, 0], up=[0, 1, 0]).scale(
-                [0.5 * AWAY * LAMP, 0.5 * AWAY * LAMP, 1]),
+            "to_world": mi.ScalarTransform4f().look_at(
+                origin=list(AWAY * toward), target=[0, 0, 0], up=[0, 1, 0]
+            ).scale([0.5 * AWAY * LAMP, 0.5 * AWAY * LAMP, 1]),
             "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [c / LAMP**2 for c in LAMP_LIGHT]}},
         },
-        "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}},
-        "sensor": {
-            **mitsuba_shapes.film(settings.width, height), "type": "orthographic", "near_clip": 0.1, "far_clip": 10.0,
-            "to_world": transform().look_at(origin=[0, 0, 5], target=[0, 0, 0], up=[0, 1, 0]).scale(
-                [0.5 * aspect, 0.5 * aspect, 1]),
-        },
+        "air": mitsuba_shapes.sky(AIR),
+        "sensor": mitsuba_shapes.overhead(mi, 0.0, shot.width, height, shot.width / height),
     }
     if len(faces):
-        scene["particles"] = mitsuba_shapes.shape(mi, "particles", (vertices - middle) * scale, faces,
-                                           tonemap.from_srgb(colours / 255.0), glossy)
-    light = mi.render(mi.load_dict(scene), integrator=mitsuba_shapes.every_lamp(mi, BOUNCES), spp=settings.spp,
-                      seed=settings.seed)
-    return np.array(light, np.float32)
+        scene["particles"] = mitsuba_shapes.painted(mi, "particles", (vertices - middle) * scale, faces, colours,
+                                                    glossy)
+    return mitsuba_shapes.rendered(mi, scene, mitsuba_shapes.every_lamp(mi, BOUNCES), shot)
 
 
 def _ground(mi: Any, ground: Ground, height: int, scale: float, middle: np.ndarray) -> Any:
@@ -115,7 +99,7 @@ def _ground(mi: Any, ground: Ground, height: int, scale: float, middle: np.ndarr
     used, faces = np.unique(tiled(z, colour), return_inverse=True)
     points, colour, faces = points[used], colour.reshape(-1, 3)[used], faces.reshape(-1, 3)
     return mitsuba_shapes.shape(mi, "ground", points, faces, colour, {
-        "type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}})
+        "type": "diffuse", "reflectance": mitsuba_shapes.VERTEX_COLOUR})
 
 
 def tiled(z: np.ndarray, colour: np.ndarray) -> np.ndarray:

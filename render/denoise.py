@@ -1,9 +1,9 @@
-"""Noise out of path-traced smoke: each window of the picture is fitted to guides that have no noise.
+"""Denoising of path-traced smoke: each window of the picture is fitted to guides that have no noise.
 
-The guides are a march through the same grid (`render.march`) and what the studio looks like without smoke.
-Within a small window path-traced light is close to a linear function of them, so a weighted least-squares fit
-keeps every edge the guides know and averages the rest (first-order regression: Moon et al. 2014, Bitterli et
-al. 2016). It is an approximation: what no guide shows is blurred to the size of the window.
+The guides are a ray-marched picture of the same grid (`render.march`) and the studio without smoke. Within a small
+window path-traced light is close to a linear function of them, so a weighted least-squares fit keeps every edge that
+the guides show and averages the rest (first-order regression: Moon et al. 2014, Bitterli et al. 2016). It is an
+approximation: what no guide shows is blurred to the size of the window.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ SMOKE_WINDOW = 6.0  # standard deviation of the window where smoke is seen, pixe
 WINDOW_SPP = 8  # with more paths per pixel windows shrink: the picture tends to the path-traced one
 SMALLEST_WINDOW = 2.0
 FLOOR_WINDOW = 16.0  # where only the floor and its soft shadows are
-BOWL_WINDOW = 3.0  # on the empty stage near the bowl, whose own shadow no guide knows
+BOWL_WINDOW = 3.0  # in the empty studio near the bowl, whose own shadow no guide shows
 RIDGE = 1e-3  # of a guide's variance in the whole picture
 
 
-def guides(seen: march.Seen, stage: march.Stage) -> np.ndarray:
-    """What a march says of the picture, (h, w, 9) float32, without noise.
+def guides(seen: march.Seen, empty: march.EmptyStudio) -> np.ndarray:
+    """The ray-marched guides of a picture, (h, w, 9) float32, without noise.
 
-    The share of light that passes the smoke; the smoke's own light; the stage seen through it, and in its shadow
-    from each lamp, in brightness.
+    The share of light that passes the smoke; the smoke's own light; the studio seen through it; for each lamp, the
+    brightness of the studio in the smoke's shadow.
     """
-    behind = seen.passed[..., None] * stage.light
+    behind = seen.passed[..., None] * empty.light
     shaded = seen.shares * behind.mean(axis=-1)
     return np.concatenate([seen.passed[..., None], seen.smoke, behind, np.moveaxis(shaded, 0, -1)], -1,
                           dtype=np.float32)
@@ -36,9 +36,9 @@ def guides(seen: march.Seen, stage: march.Stage) -> np.ndarray:
 def regressed(noisy: np.ndarray, guides: np.ndarray, window: float) -> np.ndarray:
     """`noisy` (h, w, 3), near each pixel, as a linear function of `guides` (h, w, G); (h, w, 3) float32.
 
-    One fit for the whole picture, then, of what that leaves over, one by least squares over a Gaussian
-    window (its deviation in pixels) about each pixel. RIDGE holds the second to zero where a guide hardly
-    changes, so that it finds no pattern in noise. A guide's own noise would pass on: it must have none.
+    One fit for the whole picture; then the residual is fitted by least squares in a Gaussian window (`window` is its
+    standard deviation in pixels) around each pixel. RIDGE keeps the second fit near zero where a guide hardly
+    changes, so that it does not fit noise. Noise of a guide would remain in the result: guides must have none.
     """
     height, width, count = guides.shape
     spread = guides.std(axis=(0, 1), dtype=np.float64)
@@ -68,10 +68,11 @@ def regressed(noisy: np.ndarray, guides: np.ndarray, window: float) -> np.ndarra
     return np.maximum(fitted, 0.0).astype(np.float32)
 
 
-def quiet_stage(noisy: np.ndarray, distance: np.ndarray, bowl: np.ndarray) -> np.ndarray:
-    """The light (h, w, 3) of an empty stage, path-traced, without its noise; distance: (h, w) to its surfaces.
+def quiet_studio(noisy: np.ndarray, distance: np.ndarray, bowl: np.ndarray) -> np.ndarray:
+    """The light (h, w, 3) of the path-traced empty studio, denoised.
 
-    bowl: the bowl's normals, zero where the backdrop is seen.
+    distance  (h, w) to its surfaces
+    bowl      (h, w, 3) the bowl's normals, zero where the backdrop is seen
     """
     guides = np.dstack([bowl, np.abs(bowl).sum(axis=2) > 0.0, np.log(distance)])
     share = _near(guides[..., 3], 8 * BOWL_WINDOW)
@@ -86,14 +87,13 @@ def _near(mask: np.ndarray, reach: float) -> np.ndarray:
     return ndimage.gaussian_filter((spread > 0.01).astype(np.float32), 0.5 * reach)[..., None]
 
 
-def denoised(noisy: np.ndarray, spp: int, seen: march.Seen, stage: march.Stage) -> np.ndarray:
-    """`noisy` (h, w, 3), smoke on a stage traced with `spp` paths per pixel, without its noise; float32.
+def denoised(noisy: np.ndarray, spp: int, seen: march.Seen, empty: march.EmptyStudio) -> np.ndarray:
+    """`noisy` (h, w, 3), smoke in the studio path-traced with `spp` paths per pixel, denoised; float32.
 
-    seen: what a march sees of the same.
-
-    Small windows where smoke is seen, large ones on the floor, whose shadows are soft and its noise coarse.
+    seen: the same smoke, ray-marched
+    Windows are small where smoke is seen and large on the floor, where shadows are soft.
     """
-    known = guides(seen, stage)
+    known = guides(seen, empty)
     shrunk = (WINDOW_SPP / max(spp, WINDOW_SPP)) ** 0.25  # half as wide for a quarter of the variance
     smoke = regressed(noisy, known, max(SMOKE_WINDOW * shrunk, SMALLEST_WINDOW))
     share = _near(1.0 - known[..., 0], 2 * SMOKE_WINDOW)

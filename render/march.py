@@ -8,7 +8,7 @@ march.cl.
     source     both together: what each cell sends to the eye
     look       front to back along the rays of the picture
     shade      how much of a lamp's light falls through the smoke on the surfaces round it
-    seen       all of it, on a stage
+    seen       all of it, in a studio
 
 It is an approximation in three places: smoke that scatters forwards is taken, after the first time, for smoke
 that scatters evenly and less (similarity: extinction (1 - albedo * forward) of the true one); many bounces
@@ -438,13 +438,15 @@ def shade(sigma: Any, shape: tuple[int, ...], places: np.ndarray, points: np.nda
 
 
 @dataclass(frozen=True)
-class Stage:
-    """What is round the smoke, as the camera sees it without smoke.
+class EmptyStudio:
+    """The surroundings of the smoke, as the camera sees them without smoke.
 
-    eye: (3,) the camera, world units; rays: (h, w, 3) from it through the pixels, of any length; distance:
-    (h, w) to the surface that a ray meets; layers: (lamps + 1, h, w, 3) the light that comes from each lamp, and
-    the rest of it; border: (6, 4, 3) the light that comes to the middle of the stage from each of `directions`,
-    but for the lamps' own.
+    eye       (3,) position of the camera, world units
+    rays      (h, w, 3) from it through the pixels, of any length
+    distance  (h, w) to the surface that a ray meets
+    layers    (lamps + 1, h, w, 3) the light of each lamp that the surfaces send to the camera, then all other light
+    border    (6, 4, 3) the light that reaches the middle of the studio from each of `directions`, without what
+              comes straight from the lamps
     """
 
     eye: np.ndarray
@@ -468,21 +470,21 @@ class Seen:
     passed: np.ndarray
     shares: np.ndarray
 
-    def picture(self, stage: Stage) -> np.ndarray:
-        """The smoke on its stage, linear light (h, w, 3) float32."""
-        lit = (self.shares[..., None] * stage.layers[:-1]).sum(axis=0) + stage.layers[-1]
+    def picture(self, empty: EmptyStudio) -> np.ndarray:
+        """The smoke in the studio, linear light (h, w, 3) float32."""
+        lit = (self.shares[..., None] * empty.layers[:-1]).sum(axis=0) + empty.layers[-1]
         return np.asarray(self.passed[..., None] * lit + self.smoke, np.float32)
 
 
-def seen(grid: Grid, lamps: Sequence[Lamp], medium: Medium, stage: Stage) -> Seen:
-    """What a camera sees of smoke on a stage. Shadows are soft: a place sees every point of a lamp for itself."""
-    height, width = stage.distance.shape
+def seen(grid: Grid, lamps: Sequence[Lamp], medium: Medium, empty: EmptyStudio) -> Seen:
+    """What a camera sees of smoke in a studio. Shadows are soft: each place is tested against every point of a lamp."""
+    height, width = empty.distance.shape
     shape = grid.sigma.shape
-    length = np.linalg.norm(stage.rays, axis=-1, keepdims=True)
-    unit = (stage.rays / length).reshape(-1, 3)
-    rays = np.column_stack([unit, stage.distance.reshape(-1) / grid.voxel_size])
-    looked = look(source(grid, lamps, stage.eye, medium, stage.border), shape, rays, grid.cells(stage.eye))
-    surface = (stage.eye + stage.distance[..., None] * stage.rays / length).reshape(-1, 3)
+    length = np.linalg.norm(empty.rays, axis=-1, keepdims=True)
+    unit = (empty.rays / length).reshape(-1, 3)
+    rays = np.column_stack([unit, empty.distance.reshape(-1) / grid.voxel_size])
+    looked = look(source(grid, lamps, empty.eye, medium, empty.border), shape, rays, grid.cells(empty.eye))
+    surface = (empty.eye + empty.distance[..., None] * empty.rays / length).reshape(-1, 3)
     # shadows of large lamps are soft: half the resolution shows no less of them
     sigma, _, half = _halved(opencl.to_device(grid.sigma), shape, opencl.zeros((*shape, 4)), 1.0)
     coarse = Grid(grid.sigma, 2 * grid.voxel_size, grid.origin + 0.5 * grid.voxel_size)

@@ -1,4 +1,4 @@
-"""Meshes, cameras and lamps as Mitsuba takes them, for the pictures of surfaces; the light that they exchange."""
+"""Meshes, cameras and lights as Mitsuba takes them, and an integrator for rooms with few lamps."""
 
 from __future__ import annotations
 
@@ -6,36 +6,55 @@ from typing import Any
 
 import numpy as np
 
-from render import backend, studio
+from render import backend, studio, tonemap
 
-BRIGHTEST = 3.0  # light that one surface gets from another along a path, at most
-SAMPLER = "multijitter"  # a quarter of the variance of independent paths, and less on what is lit evenly
+BRIGHTEST = 3.0  # largest radiance that one indirect bounce may add to a path
+SAMPLER = "multijitter"  # a quarter of the variance of independent samples, and less where the light is even
+VERTEX_COLOUR = {"type": "mesh_attribute", "name": "vertex_color"}
 
 
-def shape(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray,
-          bsdf: dict[str, Any]) -> Any:
-    """A Mitsuba mesh with smooth normals and a colour (N, 3), linear, at each vertex."""
+def rgb(colour: studio.Point) -> dict[str, Any]:
+    """A linear colour, or a radiance."""
+    return {"type": "rgb", "value": list(colour)}
+
+
+def shape(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray | None,
+          bsdf: dict[str, Any], smooth: bool = True) -> Any:
+    """A mesh with a linear colour (N, 3) at each vertex, for VERTEX_COLOUR, and smooth or flat shading."""
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict(bsdf)
-    made = mi.Mesh(name, len(vertices), len(faces), props=properties, has_vertex_normals=True)
-    made.add_attribute("vertex_color", 3, np.ascontiguousarray(colours, np.float32).ravel())
+    made = mi.Mesh(name, len(vertices), len(faces), props=properties, has_vertex_normals=smooth)
+    if colours is not None:
+        made.add_attribute("vertex_color", 3, np.ascontiguousarray(colours, np.float32).ravel())
     parameters = mi.traverse(made)
     parameters["vertex_positions"] = np.ascontiguousarray(vertices, np.float32).ravel()
     parameters["faces"] = np.ascontiguousarray(faces, np.uint32).ravel()
     parameters.update()
-    # Mitsuba's own are summed in any order: other bits in each run
-    parameters["vertex_normals"] = normals(vertices, faces).ravel()
-    parameters.update()
+    if smooth:
+        # Mitsuba adds up its own normals in any order: other bits in each run
+        parameters["vertex_normals"] = normals(vertices, faces).ravel()
+        parameters.update()
     return made
 
 
-def plain(mi: Any, name: str, mesh: studio.Mesh, bsdf: dict[str, Any]) -> Any:
+def painted(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray,
+            bsdf: dict[str, Any]) -> Any:
+    """The mesh of a look: vertices (N, 3), faces (M, 3), colours (N, 3) uint8, sRGB."""
+    return shape(mi, name, vertices, faces, tonemap.from_srgb(colours / 255.0), bsdf)
+
+
+def plain(mi: Any, name: str, mesh: studio.Mesh, bsdf: dict[str, Any], smooth: bool = True) -> Any:
     """A mesh of the studio, in one colour."""
-    return shape(mi, name, mesh.vertices, mesh.faces, np.ones((len(mesh.vertices), 3)), bsdf)
+    return shape(mi, name, mesh.vertices, mesh.faces, None, bsdf, smooth)
+
+
+def matte(colour: studio.Point) -> dict[str, Any]:
+    """A diffuse surface, both sides alike."""
+    return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": rgb(colour)}}
 
 
 def normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Unit normals (N, 3) float32 of the vertices: of the triangles round each, by their area."""
+    """Unit vertex normals (N, 3) float32: means of the triangles' normals, weighted by area."""
     a, b, c = (vertices[faces[:, corner]].astype(np.float64) for corner in range(3))
     of_face = np.cross(b - a, c - a)
     total = np.stack([np.bincount(faces.ravel(), np.repeat(along, 3), len(vertices)) for along in of_face.T], 1)
@@ -43,7 +62,7 @@ def normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def sensor(mi: Any, camera: studio.Camera, width: int, height: int, sampler: str = SAMPLER) -> dict[str, Any]:
-    """The camera, a long lens."""
+    """A perspective camera."""
     return {
         "type": "perspective", "fov": camera.fov, "fov_axis": "y",
         "to_world": mi.ScalarTransform4f().look_at(
@@ -52,8 +71,20 @@ def sensor(mi: Any, camera: studio.Camera, width: int, height: int, sampler: str
     }
 
 
+def overhead(mi: Any, middle: float, width: int, height: int, aspect: float, sampler: str = SAMPLER,
+             ) -> dict[str, Any]:
+    """An orthographic camera that looks along -z at x = 0, y = `middle` and sees one unit of y, `aspect` of x."""
+    transform = mi.ScalarTransform4f
+    return {
+        "type": "orthographic", "near_clip": 0.1, "far_clip": 10.0,
+        "to_world": transform().look_at(origin=[0, middle, 5], target=[0, middle, 0], up=[0, 1, 0]).scale(
+            [0.5 * aspect, 0.5 * aspect, 1]),
+        **film(width, height, sampler),
+    }
+
+
 def film(width: int, height: int, sampler: str = SAMPLER) -> dict[str, Any]:
-    """What a camera holds: a film with the box filter, so that pixels share no paths, and a sampler of paths."""
+    """The film and the sampler of a camera; with the box filter no two pixels share a path."""
     return {
         "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
                  "component_format": "float32", "rfilter": {"type": "box"}},
@@ -62,15 +93,25 @@ def film(width: int, height: int, sampler: str = SAMPLER) -> dict[str, Any]:
 
 
 def lamp(mi: Any, box: studio.Softbox) -> dict[str, Any]:
-    """A soft light."""
+    """A rectangular area light."""
     return {
         "type": "rectangle",
         "to_world": mi.ScalarTransform4f().look_at(
             origin=list(box.position), target=list(box.target), up=[0, 1, 0]
         ).scale([0.5 * box.size[0], 0.5 * box.size[1], 1.0]),
-        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(box.radiance)},
-                    "sampling_weight": box.share},
+        "emitter": {"type": "area", "radiance": rgb(box.radiance), "sampling_weight": box.share},
     }
+
+
+def sky(radiance: studio.Point) -> dict[str, Any]:
+    """The same light from all directions."""
+    return {"type": "constant", "radiance": rgb(radiance)}
+
+
+def rendered(mi: Any, scene: dict[str, Any], integrator: Any, shot: studio.Shot) -> np.ndarray:
+    """Linear light (height, width, 3) float32 of a scene, which holds the sensor."""
+    light = mi.render(mi.load_dict({"type": "scene", **scene}), integrator=integrator, spp=shot.spp, seed=shot.seed)
+    return np.array(light, np.float32)
 
 
 def every_lamp(mi: Any, bounces: int, split: int = 1) -> Any:

@@ -12,12 +12,12 @@ World units: the plate's well is at y = 0, a plate of noodles about one unit wid
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from render import backend, mitsuba_shapes, studio, tonemap
+from render import backend, mitsuba_shapes, studio
 
 CAMERA = studio.Camera(position=(0.0, 2.15, 4.7), target=(0.0, 0.125, 0.0), fov=13.2)
 WINDOW = studio.Softbox((-3.1, 2.8, -1.7), (0.0, 0.1, 0.0), (2.4, 2.0), (22.0, 19.8, 17.0), 1.0)  # left, behind
@@ -35,28 +35,17 @@ THROUGH = 0.30  # share of the wall that lets light in
 GLOSS = {"roughness": 0.30, "specular": 0.5, "clearcoat": 1.0, "clearcoat_gloss": 0.93}  # oil
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How `picture` looks at noodles: size in pixels, paths per pixel, seed; the plate's radius, world units, 0 for
-    none."""
-
-    width: int = 960
-    height: int = 540
-    spp: int = 64
-    seed: int = 1
-    plate: float = PLATE
-    camera: studio.Camera = CAMERA
-
-
-def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settings: Settings = Settings(),
-            ) -> np.ndarray:
+def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray,
+            shot: studio.Shot = studio.SHOT, plate: float = PLATE) -> np.ndarray:
     """Noodles on a plate on a table: linear light (height, width, 3).
 
-    vertices (N, 3) float32, world units; faces (M, 3) int, closed tubes; colours (N, 3) uint8, sRGB.
+    vertices (N, 3) float32, world units; faces (M, 3) int, closed tubes; colours (N, 3) uint8, sRGB
+    plate    radius of the plate, world units; 0: no plate
     """
-    vertices, camera, scale = studio.in_studio(vertices, settings.camera, CAMERA)
-    at = (-settings.camera.target[0] * scale, -settings.camera.target[2] * scale)
-    return _traced(vertices, faces, colours, replace(settings, camera=camera), TABLE_LEVEL, settings.plate * scale, at)
+    own = shot.camera or CAMERA
+    vertices, camera, scale = studio.in_studio(vertices, own, CAMERA)
+    at = (-own.target[0] * scale, -own.target[2] * scale)
+    return _traced(vertices, faces, colours, replace(shot, camera=camera), TABLE_LEVEL, plate * scale, at)
 
 
 def view(low: np.ndarray, high: np.ndarray, aspect: float) -> tuple[studio.Camera, float]:
@@ -73,41 +62,38 @@ def view(low: np.ndarray, high: np.ndarray, aspect: float) -> tuple[studio.Camer
 
 
 def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,
-          settings: Settings = Settings()) -> np.ndarray:
-    """An exemplar's noodles alone on the table, as `picture` shows them; the box from `low` to `high` (3,), which
-    holds them in all frames, fills the picture."""
-    box = np.stack([low, high])
-    aspect = settings.width / settings.height
-    level = float(studio.placed(box, low, high, settings.camera, aspect)[0, 1])
-    return _traced(studio.placed(vertices, low, high, settings.camera, aspect), faces, colours, settings, level, 0.0)
+          shot: studio.Shot) -> np.ndarray:
+    """An exemplar's noodles on the table without a plate, lit as in `picture`; the box from `low` to `high` (3,),
+    which holds them in all frames, fills the picture."""
+    camera = shot.camera or CAMERA
+    level = float(studio.placed(np.stack([low, high]), low, high, camera, shot.aspect)[0, 1])
+    placed = studio.placed(vertices, low, high, camera, shot.aspect)
+    return _traced(placed, faces, colours, replace(shot, camera=camera), level, 0.0)
 
 
-def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settings: Settings, level: float,
+def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: studio.Shot, level: float,
             radius: float, at: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
-    """Noodles over a table at y = level, and on a plate at x and z if its radius is not 0."""
+    """Noodles over a table at y = level, and on a plate centred on `at` (x, z) unless its radius is 0."""
     mi = backend.mitsuba("llvm_ad_rgb")
     scene = {
-        "type": "scene",
-        "sensor": mitsuba_shapes.sensor(mi, settings.camera, settings.width, settings.height),
+        "sensor": mitsuba_shapes.sensor(mi, shot.camera or CAMERA, shot.width, shot.height),
         "window": mitsuba_shapes.lamp(mi, WINDOW), "fill": mitsuba_shapes.lamp(mi, FILL),
-        "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}},
-        "noodles": mitsuba_shapes.shape(mi, "noodles", vertices, faces, tonemap.from_srgb(colours / 255.0), dough()),
-        "table": mitsuba_shapes.plain(mi, "table", table(level), {"type": "twosided", "bsdf": {
-            "type": "principled", "base_color": {"type": "rgb", "value": list(TABLE)}, "roughness": 0.55,
-            "specular": 0.35}}),
+        "air": mitsuba_shapes.sky(AIR),
+        "noodles": mitsuba_shapes.painted(mi, "noodles", vertices, faces, colours, dough()),
+        "table": mitsuba_shapes.plain(mi, "table", studio.backdrop().moved(0.0, level, 0.0), {
+            "type": "twosided", "bsdf": {"type": "principled", "base_color": mitsuba_shapes.rgb(TABLE),
+                                         "roughness": 0.55, "specular": 0.35}}),
     }
     if radius:
-        scene["plate"] = mitsuba_shapes.plain(mi, "plate", plate(radius, at), {
-            "type": "principled", "base_color": {"type": "rgb", "value": list(GLAZE)}, "roughness": 0.42,
+        scene["plate"] = mitsuba_shapes.plain(mi, "plate", plate_mesh(radius).moved(at[0], 0.0, at[1]), {
+            "type": "principled", "base_color": mitsuba_shapes.rgb(GLAZE), "roughness": 0.42,
             "specular": 0.5, "clearcoat": 0.5, "clearcoat_gloss": 0.9})
-    light = mi.render(mi.load_dict(scene), integrator=mitsuba_shapes.every_lamp(mi, BOUNCES), spp=settings.spp,
-                      seed=settings.seed)
-    return np.array(light, np.float32)
+    return mitsuba_shapes.rendered(mi, scene, mitsuba_shapes.every_lamp(mi, BOUNCES), shot)
 
 
 def dough() -> dict[str, Any]:
     """What noodles are made of; its colour is the vertices'."""
-    colour = {"type": "mesh_attribute", "name": "vertex_color"}
+    colour = mitsuba_shapes.VERTEX_COLOUR
     return {
         "type": "blendbsdf", "weight": THROUGH,
         "outside": {"type": "twosided", "bsdf": {"type": "principled", "base_color": colour, **GLOSS}},
@@ -115,14 +101,8 @@ def dough() -> dict[str, Any]:
     }
 
 
-def table(level: float) -> studio.Mesh:
-    """A table at y = level that rises behind into the wall without an edge."""
-    return studio.Mesh(studio.backdrop().vertices + np.array([0.0, level, 0.0], np.float32),
-                       studio.backdrop().faces)
-
-
-def plate(radius: float, at: tuple[float, float] = (0.0, 0.0)) -> studio.Mesh:
-    """A shallow plate at x and z: foot, underside, lip, slope and a flat well at y = 0."""
+def plate_mesh(radius: float) -> studio.Mesh:
+    """A shallow plate: foot, underside, lip, slope and a flat well at y = 0."""
     r, low = radius, TABLE_LEVEL
     wall = 0.020
     lip = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(-0.4, 0.7, 14) * np.pi]) * 0.5 * wall
@@ -133,6 +113,5 @@ def plate(radius: float, at: tuple[float, float] = (0.0, 0.0)) -> studio.Mesh:
     outside = np.stack([0.52 * r + (0.985 - 0.52) * r * share, low + 0.012 + (rise - 0.02 - low) * share**1.6], 1)
     inside = np.stack([0.975 * r + (well - 0.975 * r) * share, rise * (1 - ease) ** 1.25], 1)
     foot = np.array([[0.0, low + 0.002], [0.46 * r, low + 0.002], [0.50 * r, low], [0.515 * r, low + 0.004]])
-    made = studio.revolved(np.concatenate([foot, outside, np.array([[0.985 * r, rise - 0.004]]) + lip, inside,
+    return studio.revolved(np.concatenate([foot, outside, np.array([[0.985 * r, rise - 0.004]]) + lip, inside,
                                            [[0.3 * r, 0.0], [0.0, 0.0]]]), segments=256)
-    return studio.Mesh(made.vertices + np.array([at[0], 0.0, at[1]], np.float32), made.faces)

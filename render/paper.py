@@ -8,12 +8,12 @@ World units: floor at y = 0, the scene about one unit high, centred on x = z = 0
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from render import backend, mitsuba_shapes, studio, tonemap
+from render import backend, mitsuba_shapes, studio
 
 CAMERA = studio.Camera(position=(0.0, 0.74, 5.4), target=(0.0, 0.46, 0.0), fov=12.2)
 SUN = studio.Softbox((-3.4, 3.0, -0.9), (0.0, 0.4, 0.0), (1.2, 1.2), (94.0, 84.0, 70.0), 1.0)  # high, left, behind
@@ -27,58 +27,41 @@ PALETTE = ((0.965, 0.955, 0.930), (0.925, 0.905, 0.850), (0.905, 0.430, 0.330), 
 """Colours that go together, sRGB: white, cream, vermilion, amber, petrol."""
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How `picture` looks at paper: size in pixels, paths per pixel, seed."""
-
-    width: int = 960
-    height: int = 540
-    spp: int = 64
-    seed: int = 1
-    camera: studio.Camera = CAMERA
-
-
-def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settings: Settings = Settings(),
-            ) -> np.ndarray:
+def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: studio.Shot) -> np.ndarray:
     """Sheets of paper before a pale backdrop: linear light (height, width, 3).
 
-    vertices (N, 3) float32, world units; faces (M, 3) int, sheets of one layer; colours (N, 3) uint8, sRGB.
+    vertices (N, 3) float32, world units; faces (M, 3) int, one layer for each sheet; colours (N, 3) uint8, sRGB
     """
-    vertices, camera, _ = studio.in_studio(vertices, settings.camera, CAMERA)
-    return _traced(vertices, faces, colours, replace(settings, camera=camera), 0.0)
+    vertices, camera, _ = studio.in_studio(vertices, shot.camera or CAMERA, CAMERA)
+    return _traced(vertices, faces, colours, replace(shot, camera=camera), 0.0)
 
 
 def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,
-          settings: Settings = Settings()) -> np.ndarray:
-    """An exemplar's sheets in the air, as `picture` shows them; the box from `low` to `high` (3,), which holds them
-    in all frames, fills the picture."""
-    aspect = settings.width / settings.height
-    box = studio.placed(np.stack([low, high]), low, high, settings.camera, aspect)
-    placed = studio.placed(vertices, low, high, settings.camera, aspect)
-    return _traced(placed, faces, colours, settings, min(0.0, float(box[0, 1]) - CLEAR))
+          shot: studio.Shot) -> np.ndarray:
+    """An exemplar's sheets in the air, lit as in `picture`; the box from `low` to `high` (3,), which holds them in
+    all frames, fills the picture."""
+    camera = shot.camera or CAMERA
+    box = studio.placed(np.stack([low, high]), low, high, camera, shot.aspect)
+    placed = studio.placed(vertices, low, high, camera, shot.aspect)
+    return _traced(placed, faces, colours, replace(shot, camera=camera), min(0.0, float(box[0, 1]) - CLEAR))
 
 
-def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, settings: Settings,
+def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: studio.Shot,
             level: float) -> np.ndarray:
     """Sheets over a floor at y = level."""
-    backdrop = studio.backdrop()
-    ground = studio.Mesh(backdrop.vertices + np.array([0.0, level, 0.0], np.float32), backdrop.faces)
     mi = backend.mitsuba("llvm_ad_rgb")
-    scene = mi.load_dict({
-        "type": "scene",
-        "sensor": mitsuba_shapes.sensor(mi, settings.camera, settings.width, settings.height),
+    ground = studio.backdrop().moved(0.0, level, 0.0)
+    scene = {
+        "sensor": mitsuba_shapes.sensor(mi, shot.camera or CAMERA, shot.width, shot.height),
         "sun": mitsuba_shapes.lamp(mi, SUN), "fill": mitsuba_shapes.lamp(mi, FILL),
-        "air": {"type": "constant", "radiance": {"type": "rgb", "value": list(AIR)}},
-        "paper": mitsuba_shapes.shape(mi, "paper", vertices, faces, tonemap.from_srgb(colours / 255.0), paper()),
-        "backdrop": mitsuba_shapes.plain(mi, "backdrop", ground, {"type": "twosided", "bsdf": {
-            "type": "diffuse", "reflectance": {"type": "rgb", "value": list(BACKDROP)}}}),
-    })
-    light = mi.render(scene, integrator=mitsuba_shapes.every_lamp(mi, BOUNCES), spp=settings.spp,
-                      seed=settings.seed)
-    return np.array(light, np.float32)
+        "air": mitsuba_shapes.sky(AIR),
+        "paper": mitsuba_shapes.painted(mi, "paper", vertices, faces, colours, paper()),
+        "backdrop": mitsuba_shapes.plain(mi, "backdrop", ground, mitsuba_shapes.matte(BACKDROP)),
+    }
+    return mitsuba_shapes.rendered(mi, scene, mitsuba_shapes.every_lamp(mi, BOUNCES), shot)
 
 
 def paper() -> dict[str, Any]:
-    """A sheet that sends a third of the light that it does not keep through."""
-    return {"type": "principledthin", "base_color": {"type": "mesh_attribute", "name": "vertex_color"},
+    """A thin sheet; a third of the light that it does not absorb passes through it."""
+    return {"type": "principledthin", "base_color": mitsuba_shapes.VERTEX_COLOUR,
             "roughness": 0.65, "diff_trans": 0.92, "eta": 1.35, "spec_trans": 0.0}

@@ -1,7 +1,7 @@
 """Particles on a river, seen from straight above: short streaks of foam over dark water, past stones.
 
-`stage` photographs bed and stones once, by Mitsuba; `river` draws a frame's particles on it. Both return linear Rec.709
-light (h, w, 3) float32, the top row first; `render.tonemap` tones it ("filmic").
+`riverbed` renders bed and stones once, with Mitsuba; `river` draws the particles of a frame on it. Both return linear
+Rec.709 light (h, w, 3) float32, top row first, to be tone-mapped by `render.tonemap` ("filmic").
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ FADE = 8.0  # frames in which a particle appears and vanishes
 SHADE = 0.75  # how much of the stones' shadow falls on foam
 
 
-def stage(distance: np.ndarray, width: int, spp: int, seed: int) -> np.ndarray:
+def riverbed(distance: np.ndarray, width: int, spp: int, seed: int) -> np.ndarray:
     """Bed and stones without foam: light (h, w, 3), path traced by Mitsuba with `spp` paths a pixel.
 
     distance  (Y, X) float32, cells to the wall of the obstacles, negative inside
@@ -148,7 +148,7 @@ def foam_colour(speed: np.ndarray) -> np.ndarray:
 
 def river(position: np.ndarray, velocity: np.ndarray, age: np.ndarray, life: int, back: np.ndarray,
           open_water: np.ndarray, domain: tuple[float, float], streak: float, white: float) -> np.ndarray:
-    """A frame: particles as streaks over the stage `back` (h, w, 3), where `open_water` (h, w) lets them be seen.
+    """A frame: particles as streaks over the riverbed `back` (h, w, 3), visible where `open_water` (h, w) is 1.
 
     position  (N, 2) world units; velocity (N, 2) world units per second; age (N,) frames of a life of `life`
     domain    its width and height, world units, centred on x, its floor at y = 0
@@ -179,7 +179,7 @@ def river(position: np.ndarray, velocity: np.ndarray, age: np.ndarray, life: int
 
 
 def _sunlit(back: np.ndarray, open_water: np.ndarray) -> np.ndarray:
-    """How much of the sun's light falls on the water: the stage's green over that of its unshaded water, at most 1."""
+    """Share of the sun's light that falls on the water: green of the riverbed over the median of open water."""
     green = back[..., 1]
     free = green[open_water > 0.99]
     return np.clip(green / max(float(np.median(free)) if len(free) else 1.0, 1e-6), 0, 1)

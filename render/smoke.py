@@ -48,7 +48,7 @@ SMOKE_ALBEDO = (0.90, 0.905, 0.915)
 SMOKE_FORWARD = 0.2  # mean cosine of the scattering angle
 MAX_DEPTH = 32  # bounces; what is left after them is 3 % of the light
 MOST_DENSITY = 1e3  # delta tracking steps by the largest extinction: one cell of 1e8 takes for ever
-STAGE_SPP = 128  # for each light on the empty stage: it must not be noisy
+STUDIO_SPP = 128  # for each light of the empty studio: it must not be noisy
 BORDER_PATHS = 256  # for the light that comes to the smoke from each direction
 FARTHEST = 1e3  # stands for a ray that meets nothing
 MOST_SAMPLES = 2**30  # in one pass; Mitsuba's memory explodes above 2^32
@@ -191,8 +191,8 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
     if density.max() > MOST_DENSITY:
         raise ValueError(f"a density of {density.max():g} is too much to render (at most {MOST_DENSITY:g})")
     if settings.method == "march":
-        stage = empty_stage(settings)
-        return marched(density, voxel_size, origin, settings, stage).picture(stage)
+        empty = empty_studio(settings)
+        return marched(density, voxel_size, origin, settings, empty).picture(empty)
     mi = backend.mitsuba("scalar_rgb")
     scene = _studio(mi, settings.bowl)
     if density.any():
@@ -200,24 +200,24 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
     light = _photographed(mi, scene, settings)
     if not settings.denoised:
         return light
-    stage = empty_stage(settings)
-    return denoise.denoised(light, settings.spp, marched(density, voxel_size, origin, settings, stage), stage)
+    empty = empty_studio(settings)
+    return denoise.denoised(light, settings.spp, marched(density, voxel_size, origin, settings, empty), empty)
 
 
 def marched(density: np.ndarray, voxel_size: float, origin: tuple[float, float, float], settings: VolumeSettings,
-            stage: march.Stage) -> march.Seen:
+            empty: march.EmptyStudio) -> march.Seen:
     """What the march sees of a density (Z, Y, X), as of `volume`."""
     box = active_box(density) if density.any() else (slice(0, 2),) * 3
     corner = np.array(origin) + voxel_size * np.array([side.start for side in box[::-1]])
     grid = march.Grid(density[box] * np.float32(settings.extinction * voxel_size), voxel_size, corner)
     lamps = [march.Lamp(np.array(box.position) - 0.5 * sum(box.edges), box.edges, box.radiance)
              for box in studio.LAMPS.values()]
-    return march.seen(grid, lamps, march.Medium(SMOKE_ALBEDO, SMOKE_FORWARD), stage)
+    return march.seen(grid, lamps, march.Medium(SMOKE_ALBEDO, SMOKE_FORWARD), empty)
 
 
-def empty_stage(settings: VolumeSettings) -> march.Stage:
+def empty_studio(settings: VolumeSettings) -> march.EmptyStudio:
     """The studio without smoke as `settings` see it, each light for itself; kept for all frames of an animation."""
-    return _empty_stage(dataclasses.replace(settings, spp=STAGE_SPP, seed=1, extinction=1.0, method="path",
+    return _empty_studio(dataclasses.replace(settings, spp=STUDIO_SPP, seed=1, extinction=1.0, method="path",
                                             denoised=False))
 
 
@@ -232,7 +232,7 @@ def alone(density: np.ndarray, voxel_size: float, origin: tuple[float, float, fl
 
 
 @functools.lru_cache(maxsize=2)
-def _empty_stage(settings: VolumeSettings) -> march.Stage:
+def _empty_studio(settings: VolumeSettings) -> march.EmptyStudio:
     mi = backend.mitsuba("scalar_rgb")
     loaded = mi.load_dict({"type": "scene"} | _studio(mi, settings.bowl))
     # four rays per pixel: edges are as smooth as the picture's
@@ -243,14 +243,14 @@ def _empty_stage(settings: VolumeSettings) -> march.Stage:
     distance = lic.averaged(np.minimum([m.t for m in met], FARTHEST).reshape(rays.shape[:2]), 2)
     bowl = [list(m.sh_frame.n) if m.is_valid() and m.shape.id() == "bowl" else [0.0] * 3 for m in met]
     normals = lic.averaged(np.array(bowl).reshape(rays.shape), 2)
-    layers = [denoise.quiet_stage(_photographed(mi, _studio(mi, settings.bowl, [name]), settings), distance, normals)
+    layers = [denoise.quiet_studio(_photographed(mi, _studio(mi, settings.bowl, [name]), settings), distance, normals)
               for name in (*studio.LAMPS, "sky")]
-    return march.Stage(np.array(settings.camera.position), settings.camera.rays(settings.width, settings.height),
+    return march.EmptyStudio(np.array(settings.camera.position), settings.camera.rays(settings.width, settings.height),
                        distance, np.array(layers), _border(mi))
 
 
 def _border(mi: Any) -> np.ndarray:
-    """The light (6, 4, 3) that comes to the middle of the stage from each of `march.directions`, but for the lamps'
+    """The light (6, 4, 3) that comes to the middle of the studio from each of `march.directions`, but for the lamps'
     own."""
     light = np.zeros((6, 4, 3), np.float64)
     random = np.random.Generator(np.random.Philox(key=1))

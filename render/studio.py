@@ -20,6 +20,10 @@ class Mesh:
     vertices: np.ndarray
     faces: np.ndarray
 
+    def moved(self, x: float, y: float, z: float) -> Mesh:
+        """The mesh translated by (x, y, z)."""
+        return Mesh(self.vertices + np.array([x, y, z], np.float32), self.faces)
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -40,6 +44,29 @@ class Camera:
         y = half * (1.0 - 2.0 * (np.arange(height) + 0.5) / height)
         x = half * (2.0 * (np.arange(width) + 0.5) / width - 1.0) * (width / height)
         return np.asarray(ahead + x[None, :, None] * right + y[:, None, None] * up)
+
+
+@dataclass(frozen=True)
+class Shot:
+    """How a mesh is rendered.
+
+    width, height  of the picture, pixels
+    spp, seed      paths per pixel, and the seed of the sampler
+    time           seconds, for the waves of the looks under water; the others do not use it
+    camera         None: the CAMERA of the look
+    """
+
+    width: int = 960
+    height: int = 540
+    spp: int = 64
+    seed: int = 1
+    time: float = 0.0
+    camera: Camera | None = None
+
+    @property
+    def aspect(self) -> float:
+        """Width over height."""
+        return self.width / self.height
 
 
 @dataclass(frozen=True)
@@ -66,6 +93,7 @@ class Softbox:
 
 
 CAMERA = Camera()
+SHOT = Shot()
 KEY = Softbox((-3.3, 2.4, 0.9), (0.0, 0.4, 0.0), (1.5, 1.5), (44.0, 39.0, 33.0), 1.0)  # warm, raking
 RIM = Softbox((2.5, 2.0, -2.2), (0.0, 0.5, 0.0), (1.0, 1.8), (14.0, 18.0, 24.0), 1.0)  # cool, from behind
 LAMPS = {"key": KEY, "rim": RIM}

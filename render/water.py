@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, mitsuba_shapes
+from render import backend, mitsuba_shapes, studio
 from synth.noise import gradient_noise
 
 Colour = tuple[float, float, float]
@@ -115,9 +115,15 @@ def sky(mi: Any, water: Water) -> dict[str, Any]:
 
 def floor(mi: Any) -> Any:
     """The sand, as a shape."""
-    paint = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {
-        "type": "mesh_attribute", "name": "vertex_color"}}}
+    paint = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": mitsuba_shapes.VERTEX_COLOUR}}
     return mitsuba_shapes.shape(mi, "sand", *sand(), paint)
+
+
+def rendered(mi: Any, sensor: dict[str, Any], subject: dict[str, Any], look: Water, shot: studio.Shot) -> np.ndarray:
+    """Shapes under water over sand: linear light (height, width, 3) float32."""
+    sunlight = caustics(shot.time, shot.seed)
+    scene = {"sensor": sensor, "sun": sun(mi, sunlight), "sky": sky(mi, look), "sand": floor(mi), **subject}
+    return mitsuba_shapes.rendered(mi, scene, through_water(mi, sunlight, look), shot)
 
 
 @functools.cache

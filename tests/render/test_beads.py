@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from render import beads
+from render import beads, studio
 from synth.elements import mesh
 
-SMALL = beads.Settings(width=64, spp=9)
+SMALL = studio.Shot(width=64, spp=9)
 CELL = 0.02
 AXIS = (np.arange(100) + 0.5) * CELL - 1.0
 X, Y = np.meshgrid(AXIS, AXIS)
@@ -35,7 +35,7 @@ def test_a_picture_repeats_and_a_bead_lies_where_it_should() -> None:
 
 def test_a_bead_throws_a_shadow_away_from_the_lamp() -> None:
     m = red_bead(0.0, 0.0)
-    seen = beads.picture(m.vertices, m.faces, m.colours, ground(), beads.Settings(64, 36))[..., 1]
+    seen = beads.picture(m.vertices, m.faces, m.colours, ground(), studio.Shot(width=64, spp=36))[..., 1]
     assert seen[27, 35] < 0.9 * seen[20, 28]  # below to the right, above to the left
     assert seen[:6].mean() == pytest.approx(seen[-6:].mean(), rel=0.05)  # lit evenly
 

@@ -11,14 +11,14 @@ def noise(*shape: int, seed: int = 1) -> np.ndarray:
 
 
 def test_guides_know_what_is_seen_and_what_lies_in_shadow() -> None:
-    """No smoke: the stage itself in every guide of it; half seen and half in shadow: half and a quarter of it."""
+    """No smoke: the guides are the empty studio; half seen and half in shadow: a half and a quarter of it."""
     layers = np.abs(noise(3, 2, 4, 3))
-    stage = march.Stage(np.zeros(3), np.ones((2, 4, 3)), np.ones((2, 4)), layers, np.zeros((6, 4, 3)))
-    clear = denoise.guides(march.Seen(np.zeros((2, 4, 3)), np.ones((2, 4)), np.ones((2, 2, 4))), stage)
+    empty = march.EmptyStudio(np.zeros(3), np.ones((2, 4, 3)), np.ones((2, 4)), layers, np.zeros((6, 4, 3)))
+    clear = denoise.guides(march.Seen(np.zeros((2, 4, 3)), np.ones((2, 4)), np.ones((2, 2, 4))), empty)
     assert clear.shape == (2, 4, 9) and clear.dtype == np.float32
     assert clear[..., 4:7] == pytest.approx(layers.sum(axis=0), rel=1e-6)
     assert clear[..., 7] == pytest.approx(layers.sum(axis=0).mean(axis=-1), rel=1e-6)
-    half = denoise.guides(march.Seen(np.ones((2, 4, 3)), np.full((2, 4), 0.5), np.full((2, 2, 4), 0.5)), stage)
+    half = denoise.guides(march.Seen(np.ones((2, 4, 3)), np.full((2, 4), 0.5), np.full((2, 2, 4), 0.5)), empty)
     assert half[..., 0] == pytest.approx(0.5) and half[..., 1:4] == pytest.approx(1.0)
     assert half[..., 4:7] == pytest.approx(0.5 * clear[..., 4:7])
     assert half[..., 7:] == pytest.approx(0.25 * clear[..., 7:])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from render import march, smoke, studio
-from render.march import Grid, Lamp, Medium, Stage
+from render.march import EmptyStudio, Grid, Lamp, Medium
 from synth import opencl
 
 MEDIUM = Medium((0.9, 0.8, 0.95), 0.2)
@@ -116,17 +116,17 @@ def test_lamplight_fades_by_beer_lambert_from_every_side(towards: tuple[float, f
     assert line == pytest.approx(np.exp(-0.1 * cells), rel=0.01)  # the lamp is not quite infinitely far
 
 
-def test_no_smoke_shows_the_stage_exactly_and_full_light_falls_on_it() -> None:
-    stage = small_stage()
-    seen = march.seen(Grid(np.zeros((4, 5, 3), np.float32), 0.1, np.zeros(3)), [KEY, RIM], MEDIUM, stage)
-    assert np.array_equal(seen.picture(stage), stage.light)
+def test_no_smoke_shows_the_empty_studio_exactly_and_full_light_falls_on_it() -> None:
+    empty = small_studio()
+    seen = march.seen(Grid(np.zeros((4, 5, 3), np.float32), 0.1, np.zeros(3)), [KEY, RIM], MEDIUM, empty)
+    assert np.array_equal(seen.picture(empty), empty.light)
     assert (seen.shares == 1.0).all() and not seen.smoke.any()
 
 
-def small_stage() -> Stage:
+def small_studio() -> EmptyStudio:
     rays = studio.Camera(position=(0.2, 0.9, 5.0), target=(0.0, 0.5, 0.0), fov=14.0).rays(6, 8)
     distance = 5.5 + random(8, 6, seed=5)
-    return Stage(EYE, rays, distance, random(3, 8, 6, 3, seed=6).astype(np.float32), random(6, 4, 3, seed=7))
+    return EmptyStudio(EYE, rays, distance, random(3, 8, 6, 3, seed=6).astype(np.float32), random(6, 4, 3, seed=7))
 
 
 def test_a_mirrored_scene_gives_the_mirrored_picture() -> None:
@@ -135,17 +135,17 @@ def test_a_mirrored_scene_gives_the_mirrored_picture() -> None:
         flip = np.array([-1.0, 1.0, 1.0])
         return Lamp(flip * lamp.corner, (flip * lamp.edges[0], flip * lamp.edges[1]), lamp.radiance)
 
-    def other(stage: Stage) -> Stage:
+    def other(empty: EmptyStudio) -> EmptyStudio:
         vectors = march.directions() * np.array([-1.0, 1.0, 1.0])
         place = [int(np.abs(march.directions().reshape(-1, 3) - v).sum(1).argmin()) for v in vectors.reshape(-1, 3)]
         flip = np.array([-1.0, 1.0, 1.0])
-        return Stage(flip * stage.eye, flip * stage.rays[:, ::-1], stage.distance[:, ::-1], stage.layers[:, :, ::-1],
-                     stage.border.reshape(24, 3)[place].reshape(6, 4, 3))
+        return EmptyStudio(flip * empty.eye, flip * empty.rays[:, ::-1], empty.distance[:, ::-1],
+                           empty.layers[:, :, ::-1], empty.border.reshape(24, 3)[place].reshape(6, 4, 3))
 
-    stage, grid = small_stage(), cloud((4, 8, 8))
+    empty, grid = small_studio(), cloud((4, 8, 8))
     turned = Grid(grid.sigma[..., ::-1].copy(), grid.voxel_size, grid.origin)
-    first = march.seen(grid, [KEY, RIM], MEDIUM, stage).picture(stage)
-    second = march.seen(turned, [mirrored(KEY), mirrored(RIM)], MEDIUM, other(stage)).picture(other(stage))
+    first = march.seen(grid, [KEY, RIM], MEDIUM, empty).picture(empty)
+    second = march.seen(turned, [mirrored(KEY), mirrored(RIM)], MEDIUM, other(empty)).picture(other(empty))
     assert second[:, ::-1] == pytest.approx(first, rel=1e-4, abs=1e-5)
     assert np.abs(first - first[:, ::-1]).max() > 0.05
 
@@ -163,8 +163,8 @@ def test_the_shadow_lies_away_from_the_lamp_and_is_soft() -> None:
 
 
 def test_the_same_bits_each_time() -> None:
-    stage, grid = small_stage(), cloud((5, 9, 7))
-    first, again = (march.seen(grid, [KEY, RIM], MEDIUM, stage).picture(stage) for _ in range(2))
+    empty, grid = small_studio(), cloud((5, 9, 7))
+    first, again = (march.seen(grid, [KEY, RIM], MEDIUM, empty).picture(empty) for _ in range(2))
     assert np.array_equal(first, again)
 
 
@@ -203,9 +203,9 @@ def test_look_and_shade_equal_their_references(shape: tuple[int, int, int]) -> N
 
 
 def test_a_march_comes_near_many_paths() -> None:
-    """The studio with a cloud of large cells: smoke and stage within 6 % in the mean, and alike pixel by pixel.
+    """The studio with a cloud of large cells: smoke and studio within 6 % in the mean, and correlated pixel by pixel.
 
-    What is left is the size of the cells and the light that the smoke throws on the stage.
+    What is left is the size of the cells and the light that the smoke throws on the studio.
     """
     z, y, x = np.mgrid[-1:1:14j, -1:1:24j, -1:1:16j]
     body = np.clip(1.2 - np.hypot(np.hypot(x, y), z) + 0.3 * np.sin(7 * x) * np.cos(6 * y), 0.0, 1.0)
@@ -213,7 +213,7 @@ def test_a_march_comes_near_many_paths() -> None:
     many = smoke.VolumeSettings(width=40, height=50, spp=64, extinction=5.0, denoised=False)
     truth = smoke.volume(*placed, many)
     picture = smoke.volume(*placed, dataclasses.replace(many, method="march"))
-    thick = np.abs(picture - smoke.empty_stage(many).light).max(axis=-1) > 0.1
+    thick = np.abs(picture - smoke.empty_studio(many).light).max(axis=-1) > 0.1
     assert 0.1 < thick.mean() < 0.5
     assert picture[thick].mean() == pytest.approx(truth[thick].mean(), rel=0.06)
     assert picture.mean() == pytest.approx(truth.mean(), rel=0.06)

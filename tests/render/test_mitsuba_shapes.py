@@ -20,7 +20,8 @@ def test_a_lamp_faces_its_target_with_its_radiance() -> None:
     mi = backend.mitsuba("llvm_ad_rgb")
     box = studio.Softbox((0.0, 2.0, 2.0), (0.0, 0.0, 0.0), (0.5, 0.8), (3.0, 2.0, 1.0), 1.0)
     camera = studio.Camera(position=(0.0, 0.0, 0.0), target=box.position, fov=5.0)
-    scene = mi.load_dict({"type": "scene", "sensor": mitsuba_shapes.sensor(mi, camera, 8, 4), "lamp": mitsuba_shapes.lamp(mi, box)})
+    scene = mi.load_dict({"type": "scene", "sensor": mitsuba_shapes.sensor(mi, camera, 8, 4),
+                          "lamp": mitsuba_shapes.lamp(mi, box)})
     seen = np.array(mi.render(scene, integrator=mi.load_dict({"type": "direct"}), spp=4, seed=1))
     assert seen.shape == (4, 8, 3)
     assert seen == pytest.approx(np.broadcast_to(np.array([3.0, 2.0, 1.0]), (4, 8, 3)))
@@ -35,12 +36,12 @@ def room(mi: Any, *, lamps: bool, glossy: bool = False) -> Any:
              "air": {"type": "constant", "radiance": {"type": "rgb", "value": [0.5, 0.5, 0.5]}},
              "ball": {"type": "sphere", "bsdf": coat if glossy else grey}}
     if lamps:
-        turn = mi.ScalarTransform4f
+        key = studio.Softbox((3.0, 3.0, 2.0), (0, 0, 0), (1.0, 1.0), (9.0, 7.0, 5.0), 1.0)
+        fill = studio.Softbox((-3.0, 2.0, 2.0), (0, 0, 0), (2.0, 2.0), (1.0, 2.0, 3.0), 1.0)
         scene |= {
-            "one": mitsuba_shapes.lamp(mi, studio.Softbox((3.0, 3.0, 2.0), (0, 0, 0), (1.0, 1.0), (9.0, 7.0, 5.0), 1.0)),
-            "two": mitsuba_shapes.lamp(mi, studio.Softbox((-3.0, 2.0, 2.0), (0, 0, 0), (2.0, 2.0), (1.0, 2.0, 3.0), 1.0)),
+            "key": mitsuba_shapes.lamp(mi, key), "fill": mitsuba_shapes.lamp(mi, fill),
             "floor": {"type": "rectangle", "bsdf": grey,
-                      "to_world": turn().translate([0, -1, 0]).rotate([1, 0, 0], -90).scale(3)}}
+                      "to_world": mi.ScalarTransform4f().translate([0, -1, 0]).rotate([1, 0, 0], -90).scale(3)}}
     return mi.load_dict(scene)
 
 

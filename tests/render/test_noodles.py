@@ -6,7 +6,7 @@ import pytest
 from render import backend, mitsuba_shapes, noodles, studio
 from synth.elements import mesh
 
-SMALL = noodles.Settings(width=64, height=36, spp=9)
+SMALL = studio.Shot(width=64, height=36, spp=9)
 
 
 def rods(count: int = 12) -> mesh.Mesh:
@@ -23,7 +23,7 @@ def test_a_picture_repeats() -> None:
     assert np.array_equal(first, noodles.picture(m.vertices, m.faces, m.colours, SMALL))
     heap = first[14:20, 26:38].mean((0, 1))
     assert heap[0] > heap[1] > heap[2]  # golden
-    table = noodles.picture(m.vertices, m.faces, m.colours, noodles.Settings(64, 36, 9, plate=0.0))
+    table = noodles.picture(m.vertices, m.faces, m.colours, SMALL, plate=0.0)
     assert table[22:26, 10:16].mean() < 0.5 * first[22:26, 10:16].mean()  # the plate is light, the table dark
 
 
@@ -39,14 +39,14 @@ def test_a_view_shows_the_whole_plate() -> None:
     camera, radius = noodles.view(np.array([-0.2, 0.0, -0.1]), np.array([0.3, 0.9, 0.2]), 16 / 9)
     assert radius == pytest.approx(noodles.MARGIN * 0.3)
     m = rods()
-    seen = noodles.picture(m.vertices - 50, m.faces, m.colours, noodles.Settings(64, 36, 9, 1, radius, camera))
-    bare = noodles.picture(m.vertices - 50, m.faces, m.colours, noodles.Settings(64, 36, 9, 1, 0.0, camera))
+    shot = studio.Shot(64, 36, 9, camera=camera)
+    seen, bare = (noodles.picture(m.vertices - 50, m.faces, m.colours, shot, plate) for plate in (radius, 0.0))
     dish = seen.mean(-1) > 2.5 * bare.mean(-1)
     assert dish.any() and not (dish[0] | dish[-1]).any() and not (dish[:, 0] | dish[:, -1]).any()
 
 
 def test_the_plate_is_closed_below_flat_where_noodles_lie_and_above_the_table() -> None:
-    made = noodles.plate(0.8)
+    made = noodles.plate_mesh(0.8)
     radius = np.linalg.norm(made.vertices[:, [0, 2]], axis=1)
     assert radius.max() == pytest.approx(0.8, rel=0.01)
     well = mitsuba_shapes.normals(made.vertices, made.faces)[radius < 0.3, 1]

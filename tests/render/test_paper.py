@@ -6,7 +6,7 @@ import pytest
 from render import backend, mitsuba_shapes, paper, studio
 from synth.elements import mesh
 
-SMALL = paper.Settings(width=64, height=36, spp=9)
+SMALL = studio.Shot(width=64, height=36, spp=9)
 
 
 def flying(count: int = 6) -> mesh.Mesh:
@@ -39,7 +39,7 @@ def test_the_studio_is_as_large_as_what_it_shows() -> None:
     first = paper.picture(m.vertices, m.faces, m.colours, SMALL)
     large = studio.Camera((2.0, 3 * 0.74, 3 * 5.4 + 1), (2.0, 3 * 0.46, 1.0), paper.CAMERA.fov)
     moved = (3 * m.vertices + [2.0, 0.0, 1.0]).astype(np.float32)
-    second = paper.picture(moved, m.faces, m.colours, paper.Settings(64, 36, 9, camera=large))
+    second = paper.picture(moved, m.faces, m.colours, studio.Shot(64, 36, 9, camera=large))
     assert np.abs(first - second).mean() < 0.01 * first.mean()  # but for rounding
 
 
@@ -52,7 +52,8 @@ def test_a_sheet_sends_light_on_and_back(behind: bool) -> None:
     lamp = studio.Softbox((0.0, 1.0, -3.0 if behind else 3.0), (0.0, 0.0, 0.0), (1.0, 1.0), (9.0, 9.0, 9.0), 1.0)
     scene = mi.load_dict({
         "type": "scene", "sensor": mitsuba_shapes.sensor(mi, camera, 8, 8), "lamp": mitsuba_shapes.lamp(mi, lamp),
-        "wall": mitsuba_shapes.shape(mi, "wall", wall, np.array([[0, 1, 2], [0, 2, 3]]), np.ones((4, 3)), paper.paper())})
+        "wall": mitsuba_shapes.shape(mi, "wall", wall, np.array([[0, 1, 2], [0, 2, 3]]), np.ones((4, 3)),
+                                     paper.paper())})
     seen = np.array(mi.render(scene, integrator=mi.load_dict({"type": "path", "max_depth": 2}), spp=64, seed=1))
     irradiance = 9.0 / 10.0 * np.cos(np.arctan2(1.0, 3.0))
     share = seen.mean() * np.pi / irradiance

@@ -72,13 +72,13 @@ def test_a_stone_rises_from_its_waterline():
     assert height[0, 0] == 0 and (np.diff(height[0]) > 0).all()
 
 
-def test_the_stage_shows_a_lit_stone_its_shadow_and_dark_water():
+def test_the_riverbed_shows_a_lit_stone_its_shadow_and_dark_water():
     distance = obstacle.ball((30, 40), (0.0, 0.5), 0.2).distance
-    back = particles.stage(distance, 40, 16, 1)
+    back = particles.riverbed(distance, 40, 16, 1)
     assert back.shape == (30, 40, 3) and np.isfinite(back).all() and back.min() >= 0
     grey = back.mean(-1)
     water, stone = grey[2:6, 2:6].mean(), grey[12:18, 17:23].mean()
     assert stone > 3 * water
     lower_right, upper_left = grey[20:22, 24:26].mean(), grey[8:10, 14:16].mean()
     assert lower_right < 0.7 * upper_left  # away from the sun
-    assert np.array_equal(back, particles.stage(distance, 40, 16, 1))
+    assert np.array_equal(back, particles.riverbed(distance, 40, 16, 1))

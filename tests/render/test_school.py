@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from render import school
+from render import school, studio
 from synth.elements import fish
 from synth.elements.mesh import Mesh
 
-SMALL = school.Settings(width=64, height=36, spp=4)
+SMALL = studio.Shot(width=64, height=36, spp=4)
 
 
 def shown(distance: float, count: int = 5) -> Mesh:

@@ -6,7 +6,7 @@ import pytest
 from render import seaweed, studio
 
 LOOK = studio.Camera(position=(0.0, 0.5, 3.0), target=(0.0, 0.5, 0.0), fov=30.0)
-SMALL = seaweed.Settings(width=32, height=24, spp=8, camera=LOOK)
+SMALL = studio.Shot(width=32, height=24, spp=8, camera=LOOK)
 
 
 def board(z: float, size: float = 0.3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -16,11 +16,11 @@ def board(z: float, size: float = 0.3) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def test_a_picture_repeats_and_the_distance_fades_into_the_water() -> None:
-    near = seaweed.picture(*board(1.0), settings=SMALL)
+    near = seaweed.picture(*board(1.0), shot=SMALL)
     assert near.shape == (24, 32, 3) and np.isfinite(near).all() and near.min() >= 0
-    assert np.array_equal(near, seaweed.picture(*board(1.0), settings=SMALL))
-    nothing = seaweed.picture(*board(-60.0), settings=SMALL)
-    far = seaweed.picture(*board(-20.0, 3.0), settings=SMALL)
+    assert np.array_equal(near, seaweed.picture(*board(1.0), shot=SMALL))
+    nothing = seaweed.picture(*board(-60.0), shot=SMALL)
+    far = seaweed.picture(*board(-20.0, 3.0), shot=SMALL)
     middle = np.s_[8:12, 14:18]
     assert np.abs(near[middle] - nothing[middle]).max() > 0.05
     # paths to another mesh draw other numbers, so pixels of few paths agree on average only
