@@ -93,7 +93,7 @@ def spectrum(positions: np.ndarray) -> np.ndarray:
     return np.mean(np.sum(np.abs(np.fft.rfft(velocity * window, axis=0)) ** 2, axis=2), axis=1)
 
 
-def apart(one: np.ndarray, other: np.ndarray) -> float:
+def difference(one: np.ndarray, other: np.ndarray) -> float:
     """How far two functions are apart: the mean absolute difference over the mean of the first; 0 for empty ones.
 
     Of two lengths the shorter counts, both being spectra of the same frequencies from 0 on after resampling.

@@ -36,16 +36,16 @@ class Copied:
 
 
 def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spacing: float, seed: int,
-           turn: Callable[[np.ndarray], np.ndarray] | None = None, pins: np.ndarray | None = None,
+           rotation: Callable[[np.ndarray], np.ndarray] | None = None, pins: np.ndarray | None = None,
            allowed: Callable[[np.ndarray], np.ndarray] | None = None,
-           unlike: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None, count: int | None = None) -> Copied:
+           mismatch: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None, count: int | None = None) -> Copied:
     """Elements of one sample each, in a domain.
 
     radius    of the neighbourhood, the size of a patch; spacing: the exemplar's nearest distance, world units
-    turn      local frames (M, D, D) at points (M, D) of the first frame
+    rotation  local frames (M, D, D) at points (M, D) of the first frame
     pins      (P, D) hard positions in the first frame
     allowed   bits of the kinds that may stand at points (M, D)
-    unlike    how little exemplar elements (M,) suit points (M, D), from 0 to 1: a control map's difference
+    mismatch  how little exemplar elements (M,) suit points (M, D), from 0 to 1: a control map's difference
     count     of the elements; None: as dense as the exemplar
     Raises ValueError for a domain smaller than a neighbourhood, or more pins than elements.
     """
@@ -64,8 +64,8 @@ def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spaci
     source = rng.integers(0, exemplar.count, len(placed))
     cut: list[Cut] = []
     for centre in _places(domain, radius, placed):
-        patch, elements, taken = _patch(start, box, toroidal, centre, radius, rng, placed, domain, turn, spacing, cut,
-                                        unlike)
+        patch, elements, taken = _patch(start, box, toroidal, centre, radius, rng, placed, domain, rotation, spacing,
+                                        cut, mismatch)
         cut.append(taken)
         good = domain.distance(patch) > 0 if len(patch) else np.zeros(0, bool)
         patch = domain.wrapped(patch)
@@ -78,7 +78,7 @@ def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spaci
         placed, source = np.vstack([placed, patch]), np.concatenate([source, elements])
     placed, source = _counted(placed, source, expected, 0 if pins is None else len(pins), domain, exemplar, allowed,
                               rng)
-    return _over_time(exemplar, placed, source, frames, turn)
+    return _over_time(exemplar, placed, source, frames, rotation)
 
 
 def as_dense(exemplar: Elements, domain: Domain, spacing: float) -> int:
@@ -131,12 +131,12 @@ Cut = tuple[np.ndarray, np.ndarray]
 
 def _patch(start: np.ndarray, box: np.ndarray, toroidal: bool, centre: np.ndarray, radius: float,
            rng: np.random.Generator, placed: np.ndarray, domain: Domain,
-           turn: Callable[[np.ndarray], np.ndarray] | None, spacing: float, cut: list[Cut],
-           unlike: Callable[[np.ndarray, np.ndarray], np.ndarray] | None) -> tuple[np.ndarray, np.ndarray, Cut]:
+           rotation: Callable[[np.ndarray], np.ndarray] | None, spacing: float, cut: list[Cut],
+           mismatch: Callable[[np.ndarray, np.ndarray], np.ndarray] | None) -> tuple[np.ndarray, np.ndarray, Cut]:
     """The patch of the exemplar that fits best at `centre`: least crowded against what is placed, and with the fewest
     elements out of the domain. Of TRIES at random, and of those that go on where the nearest patches before it end,
     which are taken where chance fits worse by CONTINUE. Positions (K, D), which elements they are, and its cut."""
-    frame = np.eye(len(centre)) if turn is None else turn(centre[None])[0].astype(np.float64)
+    frame = np.eye(len(centre)) if rotation is None else rotation(centre[None])[0].astype(np.float64)
     tree = _tree(domain, placed) if len(placed) else None
     period = box[1] - box[0]
     room = period / 2 if toroidal else np.maximum(0, period / 2 - radius)
@@ -156,8 +156,8 @@ def _patch(start: np.ndarray, box: np.ndarray, toroidal: bool, centre: np.ndarra
         patch = centre + away[inside]
         if len(patch):
             out = domain.distance(patch) < 0
-            if unlike is not None:
-                misfit += float(unlike(patch, np.nonzero(inside)[0] % len(start)).mean())
+            if mismatch is not None:
+                misfit += float(mismatch(patch, np.nonzero(inside)[0] % len(start)).mean())
             if not toroidal:  # an exemplar that ends has borders to put on the domain's
                 misfit += float(out.mean())
             if tree is not None and not out.all():
@@ -202,15 +202,15 @@ def _counted(placed: np.ndarray, source: np.ndarray, expected: int, held: int, d
 
 
 def _over_time(exemplar: Elements, placed: np.ndarray, source: np.ndarray, frames: int,
-               turn: Callable[[np.ndarray], np.ndarray] | None) -> Copied:
+               rotation: Callable[[np.ndarray], np.ndarray] | None) -> Copied:
     """Each placed element moves as the one it was copied from."""
     element, frame = tracks(exemplar, source, frames)
     steps = np.zeros((frames, len(placed), exemplar.dimensions))
     if frames > 1 and exemplar.frames > 1:
         own = exemplar.positions[:, :, 0].astype(np.float64)
         steps[1:] = own[frame[1:], element[1:]] - own[np.maximum(frame[1:] - 1, 0), element[1:]]
-        if turn is not None:
-            steps = np.einsum("nij,tnj->tni", turn(placed), steps)
+        if rotation is not None:
+            steps = np.einsum("nij,tnj->tni", rotation(placed), steps)
     positions = (placed + np.cumsum(steps, axis=0))[:, :, None]
     return Copied(
         Elements(positions, (), exemplar.rate, exemplar.size[source], exemplar.kind[source], exemplar.colour[source]),

@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree
 from synth.elements.samples import Elements
 
 THREADS = min(8, os.cpu_count() or 1)  # each has a frame's neighbours in memory
+AT_REST = 100.0  # default weight of the motion of an exemplar that has none
 NEAREST_QUANTILE = 0.1  # of the distances to the nearest sample: what the spacing of an exemplar is called
 
 
@@ -37,6 +38,7 @@ class Shape:
     motion   weight of the motion, the samples tied in time, against the arrangement; see `search.tied_weight`
     sigma    σ_p of Eq. 10, world units (it divides the square of a distance, as printed: length²); inf: no falloff
     sigma_t  σ_t of Eq. 10, frames²
+    at_rest  weight of the motion of an exemplar of one frame, which has none; see `search.tied_weight`
     """
 
     radius: float
@@ -48,6 +50,7 @@ class Shape:
     motion: float = 0.1
     sigma: float = np.inf
     sigma_t: float = np.inf
+    at_rest: float = AT_REST
 
     def __post_init__(self) -> None:
         if not self.radius > 0 or min(self.before, self.after, self.along) < 0 or not 1 <= self.most <= 32:

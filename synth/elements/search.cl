@@ -178,7 +178,7 @@ float distance_to(const Neighborhood *o, int in, float limit, int *partner, __gl
 __kernel void nearest(__global const int *samples,        // (M) output samples that are asked for
                       __global const float *position,     // (all, D)
                       __global const float *detail,       // (all, D)
-                      __global const float *frames,       // (all, D, D), or one number where none is turned
+                      __global const float *axes,         // (all, D, D), or one number where none is turned
                       int turned, int known,              // frames from 0 to known - 1 are synthesized
                       __constant const float *period,     // (D), 0 along axes that do not repeat
                       __global const int *neighbors,      // (M, B * K)
@@ -207,7 +207,7 @@ __kernel void nearest(__global const int *samples,        // (M) output samples 
     Neighborhood o;
     float turn[D * D];
     for (int d = 0; d < D * D; d++)
-        turn[d] = turned ? frames[s * D * D + d] : (d % (D + 1) == 0 ? 1.0f : 0.0f);
+        turn[d] = turned ? axes[s * D * D + d] : (d % (D + 1) == 0 ? 1.0f : 0.0f);
     for (int b = 0; b < B; b++) {
         const int there = s / SIZE + times[b];
         o.others[b] = there < 0 || there >= known ? -1 : 0;

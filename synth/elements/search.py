@@ -28,7 +28,6 @@ CANDIDATES = 24  # of k-coherence, at most
 SIMILAR = 3  # of the exemplar's samples most like each
 DESCRIPTOR = 12  # numbers in which the exemplar's own neighbourhoods are first compared
 FIRST_FOUND = 16  # of these, by the descriptor, the most similar are taken by the distance itself
-AT_REST = 100.0  # weight of the motion of an exemplar that has none
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class Exemplar:
 
     elements: Elements
     shape: Shape
-    frames: np.ndarray | None
+    axes: np.ndarray | None
     offsets: np.ndarray
     neighbors: np.ndarray
     other: np.ndarray
@@ -245,7 +244,7 @@ def tied_weight(within: Exemplar) -> np.ndarray:
     The way of a sample in a few frames is small beside the distances to its neighbours, and would say nothing beside
     them. So its square is measured by the exemplar's own mean square of such ways, and that of a neighbourhood's radius
     by shape.motion: at 1 a motion as unlike as two of the exemplar's counts as a neighbour that is a radius away.
-    Elements of an exemplar at rest should only go with the flow: AT_REST.
+    Elements of an exemplar at rest should only go with the flow: shape.at_rest.
     """
     shape, offsets = within.shape, within.offsets
     weight = np.ones(len(offsets) + 1)
@@ -257,7 +256,7 @@ def tied_weight(within: Exemplar) -> np.ndarray:
     if typical > 0:
         weight[:-1][trail] *= max(1.0, shape.motion * shape.radius**2 / typical)
     elif within.elements.frames == 1:
-        weight[:-1][trail] *= AT_REST
+        weight[:-1][trail] *= shape.at_rest
     return weight.astype(np.float32)
 
 

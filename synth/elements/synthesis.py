@@ -54,11 +54,11 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Guides:
-    """What guides an output besides its exemplar: constraints, a global flow, an orientation field, maps.
+class Controls:
+    """What controls an output besides its exemplar: constraints, a global flow, an orientation field, maps.
 
     flow     none: elements are carried nowhere
-    turn     none: frames of `coarse` elements are given in `frames` (T·E·S, D, D), or nothing is turned
+    turn     none: the local axes of `coarse` elements are given in `axes` (T·E·S, D, D), or nothing is rotated
     control  at points (M, D) of frame t the control map's value (M,); allowed: bits of the kinds that may stand there
     period   (D,) of a toroidal output, 0 along axes that end
     """
@@ -66,7 +66,7 @@ class Guides:
     constraints: Constraints = field(default_factory=Constraints)
     flow: Flow | None = None
     turn: Turn | None = None
-    frames: np.ndarray | None = None
+    axes: np.ndarray | None = None
     control: Callable[[int, np.ndarray], np.ndarray] | None = None
     allowed: Callable[[int, np.ndarray], np.ndarray] | None = None
     period: np.ndarray | None = None
@@ -80,8 +80,8 @@ class Optimizer:
     source    (T·E·S,) int32: the exemplar sample that each was copied from, -1: from none
     """
 
-    def __init__(self, within: Exemplar, start: Elements, source: np.ndarray, guides: Guides, settings: Settings):
-        self.within, self.guides, self.settings = within, guides, settings
+    def __init__(self, within: Exemplar, start: Elements, source: np.ndarray, controls: Controls, settings: Settings):
+        self.within, self.controls, self.settings = within, controls, settings
         self.elements = start
         self.positions = start.positions.astype(np.float64)
         self.size = start.count * start.positions.shape[2]
@@ -122,23 +122,23 @@ class Optimizer:
         return (active[:, None] * self.size + np.arange(self.size)).ravel()
 
     def _pinned(self) -> np.ndarray:
-        pins = self.guides.constraints.pins
+        pins = self.controls.constraints.pins
         return np.zeros(0, int) if pins is None else pins.frame * self.size + pins.sample
 
     def _output(self, active: np.ndarray, known: int) -> tuple[Output, np.ndarray | None]:
         """What the search looks at, and how far the coarse motion has carried each sample."""
-        guides, dims = self.guides, self.positions.shape[3]
+        controls, dims = self.controls, self.positions.shape[3]
         flat = self.positions.reshape(-1, dims)
-        frames, control, allowed = guides.frames, np.zeros(len(flat), np.float32), np.full(len(flat), -1, np.int32)
+        frames, control, allowed = controls.axes, np.zeros(len(flat), np.float32), np.full(len(flat), -1, np.int32)
         for t in active:
             part = slice(t * self.size, (t + 1) * self.size)
-            if guides.turn is not None:
+            if controls.turn is not None:
                 frames = np.zeros((len(flat), dims, dims), np.float32) if frames is None or t == active[0] else frames
-                frames[part] = guides.turn(int(t), flat[part])
-            if guides.control is not None:
-                control[part] = guides.control(int(t), flat[part])
-            if guides.allowed is not None:
-                allowed[part] = guides.allowed(int(t), flat[part])
+                frames[part] = controls.turn(int(t), flat[part])
+            if controls.control is not None:
+                control[part] = controls.control(int(t), flat[part])
+            if controls.allowed is not None:
+                allowed[part] = controls.allowed(int(t), flat[part])
         coarse = self._coarse(known)
         detail = flat if coarse is None else flat - coarse
         if frames is not None:
@@ -147,7 +147,7 @@ class Optimizer:
             else:
                 # only differences in time are asked of these: each is turned as its sample is
                 detail = self._turned_trails(detail, frames)
-        output = Output(self.positions.astype(np.float32), detail.astype(np.float32), frames, known, guides.period,
+        output = Output(self.positions.astype(np.float32), detail.astype(np.float32), frames, known, controls.period,
                         control, allowed)
         return output, coarse
 
@@ -162,12 +162,12 @@ class Optimizer:
         """C of each sample, (M, D): given with the elements, or how far the flow has carried it until its frame."""
         if self.elements.coarse is not None:
             return self.elements.coarse.reshape(-1, self.positions.shape[3]).astype(np.float64)
-        if self.guides.flow is None:
+        if self.controls.flow is None:
             return None
         carried = np.zeros_like(self.positions)
         for t in range(1, known):
             before = self.positions[t - 1].reshape(-1, self.positions.shape[3])
-            carried[t] = carried[t - 1] + self.guides.flow(t - 1, before).reshape(carried[t].shape)
+            carried[t] = carried[t - 1] + self.controls.flow(t - 1, before).reshape(carried[t].shape)
         return carried.reshape(-1, self.positions.shape[3])
 
     def _anchors(self, output: Output, coarse: np.ndarray | None, active: np.ndarray) -> Iterator[Anchors]:
@@ -177,7 +177,7 @@ class Optimizer:
             samples = self._samples(active)
             yield Anchors(samples, self.carried, np.full(len(samples), self.settings.inertia * self._said()))
         for t in active:
-            yield self.guides.constraints.anchors(self.positions[t].reshape(-1, dims), int(t) * self.size)
+            yield self.controls.constraints.anchors(self.positions[t].reshape(-1, dims), int(t) * self.size)
         if self.within.anchored and coarse is not None and self.settings.centre > 0:
             yield assignment.centred(self.within, output, coarse, self.matches, active, self.settings.centre)
 
@@ -191,10 +191,10 @@ class Optimizer:
         for t in active:
             points = self.positions[t].reshape(-1, dims)
             if self.settings.hybrid and self.elements.topology == "none":
-                points = collision.resolved(points, self.radius, self.element, self.guides.period)
-            self.positions[t] = self.guides.constraints.enforced(points).reshape(self.positions[t].shape)
+                points = collision.resolved(points, self.radius, self.element, self.controls.period)
+            self.positions[t] = self.controls.constraints.enforced(points).reshape(self.positions[t].shape)
         self.positions.reshape(-1, dims)[self._pinned()] = (
-            self.guides.constraints.pins.position if self.guides.constraints.pins else np.zeros((0, dims)))
+            self.controls.constraints.pins.position if self.controls.constraints.pins else np.zeros((0, dims)))
 
     def finish(self) -> None:
         """Keep threads from passing through each other: once, since it costs as much as a few iterations."""
@@ -222,13 +222,13 @@ class Optimizer:
         self.energies = [float(energy) for energy in state["energies"]]
 
 
-def together(within: Exemplar, start: Elements, source: np.ndarray, guides: Guides, settings: Settings,
+def together(within: Exemplar, start: Elements, source: np.ndarray, controls: Controls, settings: Settings,
              kept: Mapping[str, np.ndarray] | None = None) -> Iterator[Optimizer]:
     """All frames together, non-causal: the optimizer after each iteration; its `result` when there are no more.
 
     kept   the `state` of an interrupted run after some iteration, which comes first then
     """
-    optimizer = Optimizer(within, start, source, guides, settings)
+    optimizer = Optimizer(within, start, source, controls, settings)
     every = np.arange(start.frames)
     if kept is None:
         optimizer.correct(every)
@@ -249,8 +249,8 @@ def _is_settled(optimizer: Optimizer) -> bool:
     return len(energies) > 1 and 0 <= energies[-2] - energies[-1] < STAYS * energies[-2]
 
 
-def by_frames(within: Exemplar, first: Elements, source: np.ndarray, frames: int, guides: Guides, settings: Settings,
-              kept: Mapping[str, np.ndarray] | None = None) -> Iterator[Optimizer]:
+def by_frames(within: Exemplar, first: Elements, source: np.ndarray, frames: int, controls: Controls,
+              settings: Settings, kept: Mapping[str, np.ndarray] | None = None) -> Iterator[Optimizer]:
     """Frame by frame, causal (§4.1, Sequencing): each begins as the one before, carried on. The optimizer after each
     frame; its `result` after the last.
 
@@ -263,7 +263,7 @@ def by_frames(within: Exemplar, first: Elements, source: np.ndarray, frames: int
     start = replace(first, positions=np.repeat(first.positions, frames, axis=0))
     sources = np.full(frames * first.count * first.positions.shape[2], -1, np.int32)
     sources[: len(source)] = source
-    optimizer = Optimizer(within, start, sources, guides, settings)
+    optimizer = Optimizer(within, start, sources, controls, settings)
     if kept is not None:
         optimizer.restore(kept)
         yield optimizer
@@ -281,14 +281,14 @@ def _advected(optimizer: Optimizer, frame: int) -> None:
     """A frame from the one before: carried by the flow, and by what the exemplar's matched samples do next."""
     dims, size = optimizer.positions.shape[3], optimizer.size
     before = optimizer.positions[frame - 1].reshape(-1, dims)
-    step = np.zeros_like(before) if optimizer.guides.flow is None else optimizer.guides.flow(frame - 1, before)
+    step = np.zeros_like(before) if optimizer.controls.flow is None else optimizer.controls.flow(frame - 1, before)
     example = optimizer.within.elements
     match = optimizer.matches.sample[(frame - 1) * size: frame * size, 0]
     many = example.count * example.positions.shape[2]
     following = np.where(match + many < example.frames * many, match + many, match)
     moved = optimizer.within.detail[following] - optimizer.within.detail[match]
-    if optimizer.guides.turn is not None:
-        moved = np.einsum("nij,nj->ni", optimizer.guides.turn(frame - 1, before), moved)
+    if optimizer.controls.turn is not None:
+        moved = np.einsum("nij,nj->ni", optimizer.controls.turn(frame - 1, before), moved)
     optimizer.positions[frame] = (before + step + moved).reshape(optimizer.positions[frame].shape)
     optimizer.matches.sample[frame * size: (frame + 1) * size] = np.stack(
         [following, *optimizer.matches.sample[(frame - 1) * size: frame * size, 1:].T], axis=-1)

@@ -21,7 +21,7 @@ from synth.advect import departure
 from synth.motion import assignment, initialize, neighborhood
 from synth.motion.assignment import Assigner
 from synth.motion.boundary import Constraint, walls
-from synth.motion.local_axes import local_frame
+from synth.motion.local_axes import axes_2d
 from synth.motion.search import Matcher
 
 # each level is synthesized on the domain grown by this many cells, the radius of the widest neighbourhood, so
@@ -150,7 +150,7 @@ class Synthesis:
         motions = [motion / np.float32(2 ** (len(self.levels) - 1 - i))
                    for i, motion in enumerate(pyramid.pyramid(L, len(self.levels), toroidal=False))]
         # before the margins: these are the frames that turn H into H' afterwards
-        frames = [_margin(local_frame(motion, self.along)) for motion in motions]
+        frames = [_margin(axes_2d(motion, self.along)) for motion in motions]
         return [_margin(motion) for motion in motions], frames
 
     def _first(self, frames: list[np.ndarray]) -> list[np.ndarray]:

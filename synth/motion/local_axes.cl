@@ -16,7 +16,7 @@ inline float3 lattice_sample(__global const float *lattice, int3 size, float3 at
 }
 
 // L (Z, Y, X, 3); lattice (z, y, x, 3): the second direction on cells `stride` times as wide; -> R (Z, Y, X, 3, 3)
-__kernel void solid_frame(__global const float *L, float scale, float still, __global const float *lattice,
+__kernel void axes_3d(__global const float *L, float scale, float still, __global const float *lattice,
                           int3 size, float stride, __global float *R) {
     const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
     const size_t voxel = ((size_t)z * get_global_size(1) + y) * get_global_size(0) + x;

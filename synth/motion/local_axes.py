@@ -30,7 +30,7 @@ NARROW, WIDE = 1 / 24, 1 / 4
 FAR = 1e-6
 
 
-def local_frame(L: np.ndarray, along: str = "x") -> np.ndarray:
+def axes_2d(L: np.ndarray, along: str = "x") -> np.ndarray:
     """The local x axis of the exemplar in each cell of L (Y, X, 2): unit vectors (Y, X, 2) float32.
 
     In 2D the frame is completely defined by L: the x axis follows it and the y axis stands 90 degrees on (§3.3).
@@ -46,7 +46,7 @@ def local_frame(L: np.ndarray, along: str = "x") -> np.ndarray:
     return np.where(length > 1e-12, frame / np.maximum(length, 1e-12), X_AXIS).astype(np.float32)
 
 
-def solid_frame(L: np.ndarray, towards: np.ndarray, along: str = "x") -> np.ndarray:
+def axes_3d(L: np.ndarray, towards: np.ndarray, along: str = "x") -> np.ndarray:
     """Local frames of L (Z, Y, X, 3): rotations R (Z, Y, X, 3, 3) float32, R[..., :, k] the local axis k (§3.3).
 
     along    the axis, "x" or "y", that follows L
@@ -60,13 +60,13 @@ def solid_frame(L: np.ndarray, towards: np.ndarray, along: str = "x") -> np.ndar
     out = opencl.empty((*L.shape[:-1], 3, 3))
     program = opencl.program(Path(__file__).with_suffix(".cl"), ALONG="xy".index(along))
     size = np.array([*lattice.shape[2::-1], 0], np.int32)
-    program.solid_frame(L.shape[2::-1], None, opencl.to_device(np.asarray(L, np.float32)), scale, np.float32(STILL),
+    program.axes_3d(L.shape[2::-1], None, opencl.to_device(np.asarray(L, np.float32)), scale, np.float32(STILL),
                         opencl.to_device(lattice), size, np.float32(stride), out)
     return out.get()
 
 
-def solid_frame_reference(L: np.ndarray, towards: np.ndarray, along: str = "x") -> np.ndarray:
-    """Specification of the kernel `solid_frame`; arguments as there."""
+def axes_3d_reference(L: np.ndarray, towards: np.ndarray, along: str = "x") -> np.ndarray:
+    """Specification of the kernel `axes_3d`; arguments as there."""
     scale, lattice, stride = _prepared(L, towards, along)
     e = _follow(L * scale, along)
     n = _finer(lattice, L.shape[:-1], stride)

@@ -14,7 +14,7 @@ from scipy import ndimage
 from synth import opencl
 from synth.motion.neighborhood import Space, exemplar_patches
 from synth.motion.search import Matcher
-from synth.motion.synthesis_3d import Eye, Settings, View, on_device, site_grid
+from synth.motion.views import View, ViewSearch, on_device, site_grid
 
 RADIUS = 4
 # an exemplar neighbourhood weaker than this share of the exemplar's rms shows nothing that could be missed
@@ -111,7 +111,7 @@ def measure_view(H: np.ndarray, frame: np.ndarray, view: View) -> Quality:
     9² neighbourhoods on every second cell, in the space of the exemplar's own; the gradients are along right and up.
     """
     width = 2 * RADIUS + 1
-    eye = Eye(view, view.exemplar, view.projection.T, width, Settings(1, (width,)), False)
+    eye = ViewSearch(view, view.exemplar, view.projection.T, width)
     inset = int(np.ceil(RADIUS * np.sqrt(3)))
     if min(H.shape[:3]) <= 2 * inset:
         raise ValueError(f"a field of {H.shape[2]} x {H.shape[1]} x {H.shape[0]} cells holds no neighbourhood of 9³")

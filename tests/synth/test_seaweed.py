@@ -163,6 +163,7 @@ def test_a_blade_lies_across_the_side_it_is_given() -> None:
     across = rows[:, -1] - rows[:, 0]
     assert np.abs(across[:-1] / np.linalg.norm(across[:-1], axis=1, keepdims=True)) == pytest.approx(
         np.broadcast_to([0, 0, 1], (seaweed.SAMPLES - 1, 3)), abs=1e-5)
-    turned = seaweed.ribbons(one(twist=np.pi / 2), seaweed.spines(one(), [flow()], 1.0))[0].reshape(seaweed.SAMPLES, -1, 3)
+    vertices, _, _ = seaweed.ribbons(one(twist=np.pi / 2), seaweed.spines(one(), [flow()], 1.0))
+    turned = vertices.reshape(seaweed.SAMPLES, -1, 3)
     middle = turned[-4, -1] - turned[-4, 0]
     assert abs(middle[0]) > 5 * abs(middle[2])

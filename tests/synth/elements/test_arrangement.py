@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from pipeline.files import pictures
 from synth.elements import arrangement
 from synth.elements.samples import Elements
 
-ASSETS = Path(__file__).parent.parent / "scenes" / "assets"
+ASSETS = Path(__file__).parents[3] / "scenes" / "assets"
 
 
 def nearest(elements: Elements, k: int = 1) -> np.ndarray:
@@ -100,7 +99,10 @@ def test_a_dot_across_a_border_or_a_corner_is_one() -> None:
 
 
 def test_the_pattern_of_the_project() -> None:
-    tile = pictures.read(ASSETS / "rosettes.png")[::-1]
+    import cv2
+
+    # rows upwards, RGB from OpenCV's BGR
+    tile = cv2.imread(str(ASSETS / "rosettes.png"))[::-1, :, ::-1].astype(np.float32) / 255
     elements = arrangement.drawn(tile)
     assert np.bincount(elements.kind).tolist() == [48, 40, 24, 12]
     gold = elements.positions[0, elements.kind == 3, 0] / elements.period

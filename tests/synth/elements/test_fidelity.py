@@ -31,7 +31,7 @@ def test_the_border_does_not_count_as_emptiness() -> None:
 
     whole = fidelity.statistics(points, 1.0, np.array([30.0, 30.0]))
     inner = fidelity.statistics(points, 1.0, depth=depth)
-    assert fidelity.apart(whole.correlation, inner.correlation) < 0.06
+    assert fidelity.difference(whole.correlation, inner.correlation) < 0.06
     with pytest.raises(ValueError, match="deep enough"):
         fidelity.statistics(points, 20.0, depth=depth)
 
@@ -44,7 +44,7 @@ def test_a_spectrum_shows_its_frequency() -> None:
 
 
 def test_apart_and_jitter() -> None:
-    assert fidelity.apart(np.ones(4), np.ones(4)) == 0 and fidelity.apart(np.ones(4), 2 * np.ones(4)) == 1
+    assert fidelity.difference(np.ones(4), np.ones(4)) == 0 and fidelity.difference(np.ones(4), 2 * np.ones(4)) == 1
     even = np.arange(5.0)[:, None, None, None] * np.ones((1, 2, 1, 2))
     assert fidelity.jitter(even) == 0
     assert fidelity.jitter(even**2) == pytest.approx(8.0)
@@ -54,5 +54,5 @@ def test_a_unit_smaller_than_the_radii_that_are_asked_repeats_as_often_as_it_tak
     """A hexagonal grid of 4 by 4 is the same grid as one of 12 by 12."""
     small, large = (fidelity.statistics(grid.positions, 0.95, grid.box[1] - grid.box[0])
                     for grid in (arrangement.hexagonal_grid((4, 4)), arrangement.hexagonal_grid((12, 12))))
-    assert fidelity.apart(large.correlation, small.correlation) < 0.02
+    assert fidelity.difference(large.correlation, small.correlation) < 0.02
     assert small.nearest == pytest.approx(large.nearest, rel=1e-4)

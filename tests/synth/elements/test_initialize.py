@@ -57,7 +57,7 @@ def test_elements_move_as_those_they_copy_past_the_exemplars_end() -> None:
     found = initialize.points(moving(10), disc(), 25, 2.0, 0.4, 1)
     steps = np.diff(found.elements.positions[:, :, 0], axis=0)
     assert np.allclose(steps, [0.1, 0.0], atol=1e-5)
-    turned = initialize.points(moving(10), disc(), 25, 2.0, 0.4, 1, turn=lambda p: orientation.along_directions(
+    turned = initialize.points(moving(10), disc(), 25, 2.0, 0.4, 1, rotation=lambda p: orientation.along_directions(
         np.tile([0.0, 1.0], (len(p), 1))))
     assert np.allclose(np.diff(turned.elements.positions[:, :, 0], axis=0), [0.0, 0.1], atol=1e-5)
 
@@ -94,10 +94,10 @@ def test_a_control_map_chooses_the_patches() -> None:
     large = points.positions[0, :, 0, 0] > 6
     exemplar = Elements(points.positions, size=1.0 + large, box=points.box)
 
-    def unlike(at: np.ndarray, elements: np.ndarray) -> np.ndarray:
+    def mismatch(at: np.ndarray, elements: np.ndarray) -> np.ndarray:
         return ((at[:, 0] < 0) - large[elements].astype(float)) ** 2
 
-    found = initialize.points(exemplar, disc(), 1, 2.0, 1.0, 1, unlike=unlike)
+    found = initialize.points(exemplar, disc(), 1, 2.0, 1.0, 1, mismatch=mismatch)
     left = found.elements.positions[0, :, 0, 0] < 0
     assert found.elements.size[left].mean() > 1.8 and found.elements.size[~left].mean() < 1.2
     plain = initialize.points(exemplar, disc(), 1, 2.0, 1.0, 1).elements

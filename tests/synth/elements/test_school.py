@@ -9,14 +9,14 @@ import pytest
 from synth.elements import school
 from synth.elements.samples import Elements
 
-TRACKS = Path(__file__).parent.parent / "scenes" / "assets" / "fish-school" / "ground_truth.csv"
+TRACKS = Path(__file__).parents[3] / "scenes" / "assets" / "fish-school" / "ground_truth.csv"
 FLANKS = 0.13  # thickness of a fish over its length
 SCHOOLS: dict[str, Callable[..., tuple[Elements, float]]] = {
     "homogeneous": school.homogeneous, "crossing": school.crossing, "mixed": school.mixed}
 
 
 @pytest.fixture(scope="module", params=SCHOOLS)
-def school(request: pytest.FixtureRequest) -> tuple[str, Elements, float]:
+def made_school(request: pytest.FixtureRequest) -> tuple[str, Elements, float]:
     return request.param, *SCHOOLS[request.param]()
 
 
@@ -36,8 +36,8 @@ def distances(elements: Elements) -> np.ndarray:
     return distance
 
 
-def test_a_school_is_of_fish_in_a_box(school: tuple[str, Elements, float]) -> None:
-    name, elements, speed = school
+def test_a_school_is_of_fish_in_a_box(made_school: tuple[str, Elements, float]) -> None:
+    name, elements, speed = made_school
     assert elements.topology == "none" and elements.frames == 60 and 20 <= elements.count <= 60
     assert elements.box is not None and elements.period is not None and (elements.box[0] == 0).all() and speed > 0
     first = elements.positions[0, :, 0]
@@ -45,8 +45,8 @@ def test_a_school_is_of_fish_in_a_box(school: tuple[str, Elements, float]) -> No
     assert np.bincount(elements.kind).tolist() == ([41, 3] if name == "mixed" else [elements.count])
 
 
-def test_no_fish_swims_backwards(school: tuple[str, Elements, float]) -> None:
-    _, elements, speed = school
+def test_no_fish_swims_backwards(made_school: tuple[str, Elements, float]) -> None:
+    _, elements, speed = made_school
     assert (motion(elements, 1)[..., 0] + speed).min() > 0.35 * speed
 
 
@@ -57,8 +57,8 @@ def test_nor_in_the_slowest_school(made: Callable[..., tuple[Elements, float]], 
     assert (motion(elements, 1)[..., 0] + speed).min() > 0
 
 
-def test_tracks_are_smooth(school: tuple[str, Elements, float]) -> None:
-    name, elements, _ = school
+def test_tracks_are_smooth(made_school: tuple[str, Elements, float]) -> None:
+    name, elements, _ = made_school
     hardest = 28 if name == "crossing" else 3  # spacings per s²: a dart is a dart
     acceleration = np.linalg.norm(motion(elements, 2), axis=-1)
     assert acceleration.max() < hardest
@@ -67,8 +67,8 @@ def test_tracks_are_smooth(school: tuple[str, Elements, float]) -> None:
     assert change.max() < 0.4 * acceleration.max()
 
 
-def test_fish_keep_their_distance(school: tuple[str, Elements, float]) -> None:
-    name, elements, _ = school
+def test_fish_keep_their_distance(made_school: tuple[str, Elements, float]) -> None:
+    name, elements, _ = made_school
     distance = distances(elements)
     thickness = FLANKS * (elements.size[:, None] + elements.size[None]) / 2
     assert (distance > 1.5 * thickness).all()
@@ -77,8 +77,8 @@ def test_fish_keep_their_distance(school: tuple[str, Elements, float]) -> None:
     assert small.min() > (0.4 if name == "crossing" else 0.75)
 
 
-def test_the_frame_swims_with_the_school(school: tuple[str, Elements, float]) -> None:
-    _, elements, _ = school
+def test_the_frame_swims_with_the_school(made_school: tuple[str, Elements, float]) -> None:
+    _, elements, _ = made_school
     drift = (elements.positions[-1] - elements.positions[0]).mean((0, 1))
     assert np.abs(drift).max() < 1e-5
 

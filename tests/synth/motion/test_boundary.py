@@ -17,7 +17,7 @@ from synth.motion.boundary import (
 )
 from synth.motion.detail import Settings, Synthesis, synthesize
 from synth.motion.exemplar import exemplar
-from synth.motion.local_axes import local_frame, to_world
+from synth.motion.local_axes import axes_2d, to_world
 
 
 def drawn(*shape):
@@ -118,7 +118,7 @@ def test_at_the_stone_of_figure_7_the_normal_component_falls_below_two_percent()
         settings = Settings(2, iterations=2)
         frames = synthesize(exemplar("sinusoid", 16), L, shape, settings, 1, distance if observed else None)
         for motion, H in zip(L, frames, strict=True):
-            world = to_world(H, local_frame(motion))
+            world = to_world(H, axes_2d(motion))
             share[observed] = float(np.sqrt(np.mean(at_the_wall(world, centre, radius) ** 2) / np.mean(H**2)))
             assert not observed or share[True] <= 0.02
     assert share[False] > 0.2

@@ -1,6 +1,7 @@
 """Density: the exact identities of pseudocode 3 and 4, one step at a time against the NumPy reference,
 sources."""
 
+import hashlib
 import itertools
 import os
 import subprocess
@@ -308,25 +309,24 @@ def test_the_memory_it_says_grows_with_cells_and_with_the_window():
 
 # Repeatability: another process, one thread, cold kernel cache.
 
-SUM = """
-import hashlib
-from tests.test_density import SOURCES, flows
-from synth.motion.density import windowed
-digest = hashlib.sha256()
-for shape in ((20, 70), (7, 12, 9)):
-    for D in windowed(flows(shape, 9), flows(shape, 9, seed=1), SOURCES, 4, scale=1.5):
-        digest.update(D.tobytes())
-print(digest.hexdigest())
-"""
+def digest():
+    """SHA-256 of densities in two and in three dimensions: what the subprocesses below print."""
+    found = hashlib.sha256()
+    for shape in ((20, 70), (7, 12, 9)):
+        for D in windowed(flows(shape, 9), flows(shape, 9, seed=1), SOURCES, 4, scale=1.5):
+            found.update(D.tobytes())
+    return found.hexdigest()
 
 
 def test_the_same_bits_with_one_thread_and_two_in_a_cold_and_a_warm_cache(tmp_path):
-    def digest(threads):
+    code = "import runpy, sys; print(runpy.run_path(sys.argv[1])['digest']())"
+
+    def told(threads):
         environment = {**os.environ, "POCL_MAX_PTHREAD_COUNT": str(threads), "POCL_CACHE_DIR": str(tmp_path),
                        "XDG_CACHE_HOME": str(tmp_path)}
-        return subprocess.run([sys.executable, "-c", SUM], env=environment, check=True, text=True,
-                              capture_output=True, cwd=Path(__file__).parents[1]).stdout
+        return subprocess.run([sys.executable, "-c", code, __file__], env=environment, check=True, text=True,
+                              capture_output=True, cwd=Path(__file__).parents[3]).stdout
 
-    first = digest(1)
+    first = told(1)
     assert len(first) == 65
-    assert [digest(1), digest(2)] == [first] * 2
+    assert [told(1), told(2)] == [first] * 2

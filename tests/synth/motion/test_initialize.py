@@ -5,7 +5,7 @@ import pytest
 
 from synth.motion.exemplar import exemplar
 from synth.motion.initialize import mosaics, owners, owners_reference, random_pixels, reseed
-from synth.motion.local_axes import local_frame
+from synth.motion.local_axes import axes_2d
 from synth.motion.quality import measure, whole_motifs
 
 
@@ -82,7 +82,7 @@ def test_a_mosaic_uses_the_exemplar_better_than_random_pixels():
 def test_owners_equal_their_reference(shape, edge, count):
     """Near or far, many or few of them, crowded into a corner or spread."""
     random = generator(6)
-    frame = local_frame(random.standard_normal((*shape, 2), dtype=np.float32))
+    frame = axes_2d(random.standard_normal((*shape, 2), dtype=np.float32))
     last = np.array(shape[::-1], np.float32) - 1
     centres = random.random((3, count, 2), dtype=np.float32) * last
     centres[2] *= np.float32(0.1)

@@ -25,7 +25,7 @@ from synth.motion.lagrangian import (
     site_bins,
     thin,
 )
-from synth.motion.local_axes import local_frame
+from synth.motion.local_axes import axes_2d
 from synth.motion.quality import measure, whole_motifs
 
 SHAPES = [(5, 7), (2, 2), (1, 9), (9, 1), (1, 1), (21, 26)]
@@ -164,9 +164,9 @@ def test_a_few_frames_are_as_good_as_on_a_grid():
         state = synthesis.frame(L, state)
         H = synthesis.visible(state)
         assert H.shape == (64, 64, 2) and H.dtype == np.float32 and np.isfinite(H).all()
-        found = measure(H, local_frame(L), I)
+        found = measure(H, axes_2d(L), I)
         assert found.used > 0.9 and 0.85 < found.rms < 1.15 and found.forward < 0.35
-    whole, motifs = whole_motifs(H, local_frame(L), I)
+    whole, motifs = whole_motifs(H, axes_2d(L), I)
     assert motifs >= 5 and whole >= 0.8 * motifs
     at, values = synthesis.samples(state)
     assert len(at) == len(values) and 0.7 * 64**2 < len(at) < 2 * 64**2

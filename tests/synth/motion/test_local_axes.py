@@ -5,12 +5,12 @@ import pytest
 from scipy import ndimage
 
 from synth.motion.local_axes import (
+    axes_2d,
+    axes_3d,
+    axes_3d_reference,
     interpolated_directions,
     largest_turn,
-    local_frame,
     outward,
-    solid_frame,
-    solid_frame_reference,
     to_world,
 )
 from synth.smoke import simulate
@@ -25,7 +25,7 @@ def flow(shape, seed=0):
 @pytest.mark.parametrize("shape", SHAPES)
 def test_the_x_axis_is_a_unit_vector_along_the_flow(shape):
     L = flow(shape)
-    frame = local_frame(L)
+    frame = axes_2d(L)
     assert frame.dtype == np.float32 and frame.shape == L.shape
     np.testing.assert_allclose(np.linalg.norm(frame, axis=-1), 1, atol=1e-6)
     speed = np.linalg.norm(L, axis=-1)
@@ -36,32 +36,32 @@ def test_the_x_axis_is_a_unit_vector_along_the_flow(shape):
 @pytest.mark.parametrize("angle", np.linspace(-np.pi, np.pi, 9))
 def test_every_direction_of_a_constant_flow(angle):
     direction = np.float32([np.cos(angle), np.sin(angle)])
-    frame = local_frame(np.broadcast_to(3 * direction, (4, 5, 2)).astype(np.float32))
+    frame = axes_2d(np.broadcast_to(3 * direction, (4, 5, 2)).astype(np.float32))
     np.testing.assert_allclose(frame, np.broadcast_to(direction, (4, 5, 2)), atol=2e-3)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_resting_field_has_the_axes_of_the_domain(shape):
-    np.testing.assert_array_equal(local_frame(np.zeros((*shape, 2), np.float32)),
+    np.testing.assert_array_equal(axes_2d(np.zeros((*shape, 2), np.float32)),
                                   np.broadcast_to(np.float32([1, 0]), (*shape, 2)))
 
 
 def test_the_frame_does_not_depend_on_speed():
     """Nor on the unit: a flow a million times slower gives the same frames."""
     L = flow((9, 8))
-    np.testing.assert_allclose(local_frame(L * np.float32(1e-6)), local_frame(L), atol=1e-5)
+    np.testing.assert_allclose(axes_2d(L * np.float32(1e-6)), axes_2d(L), atol=1e-5)
 
 
 def test_noise_of_a_resting_part_turns_no_frame():
     L = flow((9, 8)) * np.float32(1e-6)
     L[:, 4:] = 1, 1
-    assert (local_frame(L)[:, :4, 0] > 0.999).all()
+    assert (axes_2d(L)[:, :4, 0] > 0.999).all()
 
 
 def test_opposing_the_fallback_exactly_is_no_division_by_zero():
     L = np.full((3, 3, 2), (0, 1), np.float32)
     L[1, 1] = -1e-3 * np.sqrt(np.mean(np.sum(L**2, -1))), 0
-    frame = local_frame(L)
+    frame = axes_2d(L)
     assert np.isfinite(frame).all()
     np.testing.assert_allclose(np.linalg.norm(frame, axis=-1), 1, atol=1e-5)
 
@@ -80,34 +80,34 @@ def test_along_y_what_pointed_right_points_up():
 def test_figure_2_a_swirl_on_a_diagonal_flow_turns_with_it():
     """Detail that runs along the exemplar's x axis runs along the flow in the domain, at its own speed."""
     L = flow((6, 6))
-    frame = local_frame(L)
+    frame = axes_2d(L)
     H = np.zeros_like(L)
     H[..., 0] = 0.7
     np.testing.assert_allclose(to_world(H, frame), 0.7 * frame, atol=1e-6)
 
 
 def test_lengths_and_angles_are_kept():
-    H, other, frame = flow((9, 8), 1), flow((9, 8), 2), local_frame(flow((9, 8), 3))
+    H, other, frame = flow((9, 8), 1), flow((9, 8), 2), axes_2d(flow((9, 8), 3))
     a, b = to_world(H, frame), to_world(other, frame)
     np.testing.assert_allclose(np.linalg.norm(a, axis=-1), np.linalg.norm(H, axis=-1), rtol=1e-5)
     np.testing.assert_allclose(np.sum(a * b, -1), np.sum(H * other, -1), atol=1e-5)
 
 
 def test_the_frame_turned_back_undoes_it():
-    H, frame = flow((9, 8), 1), local_frame(flow((9, 8), 3))
+    H, frame = flow((9, 8), 1), axes_2d(flow((9, 8), 3))
     np.testing.assert_allclose(to_world(to_world(H, frame), frame * np.float32([1, -1])), H, atol=1e-6)
 
 
 def test_with_the_y_axis_along_the_flow_what_is_upright_rises_with_it():
     """A flow straight up leaves the exemplar as it is; any other turns it by as much as the flow is off that."""
-    np.testing.assert_array_equal(local_frame(np.full((2, 3, 2), (0, 1.5), np.float32), "y"),
-                                  local_frame(np.full((2, 3, 2), (1.5, 0), np.float32), "x"))
+    np.testing.assert_array_equal(axes_2d(np.full((2, 3, 2), (0, 1.5), np.float32), "y"),
+                                  axes_2d(np.full((2, 3, 2), (1.5, 0), np.float32), "x"))
     L = flow((6, 5))
-    x, y = local_frame(L, "x"), local_frame(L, "y")
+    x, y = axes_2d(L, "x"), axes_2d(L, "y")
     strong = np.linalg.norm(L, axis=-1) > 0.3
     np.testing.assert_allclose((y[..., 0] * x[..., 0] + y[..., 1] * x[..., 1])[strong], 0, atol=0.01)
     np.testing.assert_allclose((y[..., 0] * x[..., 1] - y[..., 1] * x[..., 0])[strong], 1, atol=0.01)
-    np.testing.assert_array_equal(local_frame(np.zeros((2, 2, 2), np.float32), "y"),
+    np.testing.assert_array_equal(axes_2d(np.zeros((2, 2, 2), np.float32), "y"),
                                   np.full((2, 2, 2), (1, 0), np.float32))
 
 
@@ -140,9 +140,9 @@ def turns(R):
 @pytest.mark.parametrize("shape", SOLIDS)
 def test_the_kernel_follows_its_specification_and_gives_rotations(shape, along):
     L, towards = solid_flow(shape, 1), solid_flow(shape, 2)
-    R = solid_frame(L, towards, along)
+    R = axes_3d(L, towards, along)
     assert R.dtype == np.float32 and R.shape == (*shape, 3, 3)
-    np.testing.assert_allclose(R, solid_frame_reference(L, towards, along), atol=2e-5)
+    np.testing.assert_allclose(R, axes_3d_reference(L, towards, along), atol=2e-5)
     np.testing.assert_allclose(R @ np.swapaxes(R, -1, -2), np.broadcast_to(np.eye(3), R.shape), atol=2e-6)
     assert (np.linalg.det(R) > 0.999).all()
 
@@ -150,7 +150,7 @@ def test_the_kernel_follows_its_specification_and_gives_rotations(shape, along):
 @pytest.mark.parametrize("along", ["x", "y"])
 def test_one_axis_follows_the_flow_the_last_looks_along_the_second_direction(along):
     L, towards = everywhere([1, 2, 2]), everywhere([3, 0, 1])
-    R = solid_frame(L, towards, along)
+    R = axes_3d(L, towards, along)
     np.testing.assert_allclose(R[..., "xy".index(along)], L / 3, atol=2e-3)
     across = towards - np.sum(towards * L, -1, keepdims=True) * L / 9
     np.testing.assert_allclose(R[..., 2], across / np.linalg.norm(across, axis=-1, keepdims=True), atol=5e-3)
@@ -158,21 +158,21 @@ def test_one_axis_follows_the_flow_the_last_looks_along_the_second_direction(alo
 
 @pytest.mark.parametrize(("along", "L"), [("x", [2, 0, 0]), ("y", [0, 0.3, 0]), ("x", [0, 0, 0]), ("y", [0, 0, 0])])
 def test_along_the_domains_axes_or_at_rest_the_frame_is_the_domain(along, L):
-    np.testing.assert_allclose(solid_frame(everywhere(L), everywhere(FRONT), along),
+    np.testing.assert_allclose(axes_3d(everywhere(L), everywhere(FRONT), along),
                                np.broadcast_to(np.eye(3), (4, 5, 6, 3, 3)), atol=1e-6)
-    np.testing.assert_allclose(solid_frame(everywhere(L), everywhere([0, 0, 0]), along),
+    np.testing.assert_allclose(axes_3d(everywhere(L), everywhere([0, 0, 0]), along),
                                np.broadcast_to(np.eye(3), (4, 5, 6, 3, 3)), atol=1e-6)
 
 
 def test_a_second_direction_along_the_flow_everywhere_is_no_division_by_zero():
     for direction in np.eye(3):
-        R = solid_frame(everywhere(direction), everywhere(direction))
+        R = axes_3d(everywhere(direction), everywhere(direction))
         np.testing.assert_allclose(R @ np.swapaxes(R, -1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-5)
 
 
 def test_frames_do_not_depend_on_units():
     L, towards = solid_flow((5, 6, 7), 1), solid_flow((5, 6, 7), 2)
-    np.testing.assert_allclose(solid_frame(L * np.float32(1e-6), towards * np.float32(1e4)), solid_frame(L, towards),
+    np.testing.assert_allclose(axes_3d(L * np.float32(1e-6), towards * np.float32(1e4)), axes_3d(L, towards),
                                atol=1e-4)
 
 
@@ -183,7 +183,7 @@ def test_where_the_second_direction_runs_along_the_flow_what_lies_around_decides
     tilt = np.pi / 2 * np.exp(-((x / 0.5) ** 2))
     L = np.stack([np.cos(tilt), np.sin(tilt), 0 * tilt], -1).astype(np.float32)
     towards = everywhere([0, 1, 0.05], shape)
-    assert turns(solid_frame(L, towards)).max() < 30
+    assert turns(axes_3d(L, towards)).max() < 30
 
 
 def test_a_swirl_with_an_updraught_has_no_seam():
@@ -192,7 +192,7 @@ def test_a_swirl_with_an_updraught_has_no_seam():
     x, y, z = coordinates(shape)
     L = np.stack([-z, 0.5 + 0 * y, x], -1).astype(np.float32)
     towards = np.stack([x, 0 * y, z], -1).astype(np.float32)
-    R = solid_frame(L, towards, "y")
+    R = axes_3d(L, towards, "y")
     off_axis = np.hypot(x, z)[0, 0] > 0.3
     assert np.sum(turns(R) > 30) < 0.01 * R[..., 0, 0].size
     assert turns(R[:, :, off_axis][:, :, :8]).max() < 20
@@ -208,7 +208,7 @@ def test_a_plumes_frames_turn_little_between_voxels_and_between_frames():
     before = None
     for v, density in simulate((24, 32, 24), 20, seed=1, warmup=20):
         L, D = (ndimage.zoom(a, (2, 2, 2, 1)[:a.ndim], order=1, grid_mode=True, mode="nearest") for a in (v, density))
-        R = solid_frame(L, outward(D), "y")
+        R = axes_3d(L, outward(D), "y")
         angles = turns(R)
         assert np.mean(angles > 30) < 0.012 and np.mean(angles > 90) < 0.0015 and angles.mean() < 6
         if before is not None:
@@ -271,7 +271,7 @@ def test_the_largest_turn_of_known_rotations():
 
 
 def test_in_space_lengths_are_kept_and_the_frame_turned_back_undoes_it():
-    H, R = solid_flow((4, 5, 6), 3), solid_frame(solid_flow((4, 5, 6), 1), solid_flow((4, 5, 6), 2))
+    H, R = solid_flow((4, 5, 6), 3), axes_3d(solid_flow((4, 5, 6), 1), solid_flow((4, 5, 6), 2))
     world = to_world(H, R)
     np.testing.assert_allclose(np.linalg.norm(world, axis=-1), np.linalg.norm(H, axis=-1), rtol=1e-5)
     np.testing.assert_allclose(to_world(world, np.swapaxes(R, -1, -2)), H, atol=1e-5)

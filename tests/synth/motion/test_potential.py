@@ -7,7 +7,7 @@ from scipy import ndimage
 from synth.motion import detail, potential
 from synth.motion.detail import Settings, enough_levels
 from synth.motion.exemplar import exemplar
-from synth.motion.local_axes import local_frame, to_world
+from synth.motion.local_axes import axes_2d, to_world
 from synth.motion.potential import Synthesis, curl
 from synth.motion.quality import measure, whole_motifs
 from synth.projection import divergence, project
@@ -87,7 +87,7 @@ def test_what_is_synthesized_has_no_divergence_and_whole_motifs(search):
     for state in (first, synthesis.frame(L, first)):
         H = synthesis.visible(state)
         assert H.shape == (72, 72, 2) and H.dtype == np.float32
-        world, frame = to_world(H, local_frame(L)), local_frame(L)
+        world, frame = to_world(H, axes_2d(L)), axes_2d(L)
         slopes = np.sqrt(sum(np.mean(np.gradient(world[..., c], axis=a) ** 2) for c in (0, 1) for a in (0, 1)))
         assert np.sqrt(np.mean(divergence(world)[1:-1, 1:-1] ** 2)) < 1e-6 * slopes
     found = measure(H, frame, I)
@@ -98,7 +98,7 @@ def test_what_is_synthesized_has_no_divergence_and_whole_motifs(search):
 
 def test_the_exemplar_is_a_fixed_point():
     synthesis = Synthesis(exemplar("heart", 16), (48, 48), Settings(2), 1)
-    level, frame = synthesis.levels[-1], local_frame(np.broadcast_to(np.float32([1, 0]), (48, 48, 2)))
+    level, frame = synthesis.levels[-1], axes_2d(np.broadcast_to(np.float32([1, 0]), (48, 48, 2)))
     psi = np.tile(level.exemplar, (3, 3, 1))
     np.testing.assert_allclose(level.optimize(psi, frame, 2)[0].get()[8:-8, 8:-8], psi[8:-8, 8:-8],
                                atol=0.02 * np.abs(psi).max())
@@ -110,7 +110,7 @@ def test_nothing_flows_through_a_wall_and_inside_it_rests():
     away_x, away_y = x - 23.5, y - 23.5
     distance = (np.hypot(away_x, away_y) - 10).astype(np.float32)
     synthesis = Synthesis(exemplar("sinusoid", 16), (48, 48), Settings(2), 1, distance)
-    H = to_world(synthesis.visible(synthesis.frame(L, None)), local_frame(L))
+    H = to_world(synthesis.visible(synthesis.frame(L, None)), axes_2d(L))
     normal = np.stack([away_x, away_y], -1) / np.hypot(away_x, away_y)[..., None]
     rms = np.sqrt(np.mean(H[distance > 4] ** 2))
     at_wall = np.abs(distance) < 0.5
@@ -125,4 +125,4 @@ def test_the_same_seed_gives_the_same_bits_and_the_margin_sees_the_same_frames()
     state = first.frame(L, None)
     np.testing.assert_array_equal(first.visible(state), again.visible(again.frame(L, None)))
     margin = detail.MARGIN
-    np.testing.assert_array_equal(state.frame[-1][margin:-margin, margin:-margin], local_frame(L))
+    np.testing.assert_array_equal(state.frame[-1][margin:-margin, margin:-margin], axes_2d(L))

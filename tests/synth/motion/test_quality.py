@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from synth.motion.exemplar import exemplar
-from synth.motion.local_axes import local_frame
+from synth.motion.local_axes import axes_2d
 from synth.motion.neighborhood import exemplar_patches
 from synth.motion.quality import RADIUS, measure, measure_view, motif, oriented, whole_motifs
 from synth.motion.synthesis_3d import View
@@ -179,7 +179,7 @@ def test_oriented_windows_read_along_the_frame():
 def test_local_frames_of_a_flow_are_what_measure_expects():
     H, _, I = tiled()
     L = along(0, H.shape[:2])
-    assert measure(H, local_frame(L), I).forward < 2e-3
+    assert measure(H, axes_2d(L), I).forward < 2e-3
 
 
 def test_a_view_of_its_own_extrusion_is_perfect():

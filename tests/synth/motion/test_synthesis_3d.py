@@ -1,11 +1,11 @@
-"""Solid synthesis: what the views see and say, then the kernels against their references, then whole fields."""
+"""Synthesis in 3-D: what is carried from frame to frame against its reference, then whole fields."""
 
 import numpy as np
 import pytest
 
-from synth import opencl
 from synth.advect import departure
 from synth.motion import exemplar, synthesis_3d
+from synth.motion.views import View
 
 FRONT, SIDE, TOP = ((1, 0, 0), (0, 1, 0)), ((0, 0, 1), (0, 1, 0)), ((1, 0, 0), (0, 0, 1))
 
@@ -14,47 +14,8 @@ def picture(shape=(8, 8), seed=0):
     return np.random.default_rng(seed).normal(size=(*shape, 2)).astype(np.float32)
 
 
-def views(I, *planes, weights=(1, 1, 1)):
-    return [synthesis_3d.View(I, *plane, weight) for plane, weight in zip(planes, weights, strict=False)]
-
-
-def test_three_planes_give_equation_2():
-    # x is seen by front and top, y by front and side, z by side and top: each the mean of two
-    front, side, top = synthesis_3d.contributions(views(picture(), FRONT, SIDE, TOP))
-    np.testing.assert_allclose(front, [[0.5, 0], [0, 0.5], [0, 0]], atol=1e-12)
-    np.testing.assert_allclose(side, [[0, 0], [0, 0.5], [0.5, 0]], atol=1e-12)
-    np.testing.assert_allclose(top, [[0.5, 0], [0, 0], [0, 0.5]], atol=1e-12)
-
-
-def test_a_weighty_view_has_its_way():
-    front, side, _ = synthesis_3d.contributions(views(picture(), FRONT, SIDE, TOP, weights=(9, 1, 1)))
-    np.testing.assert_allclose(front[0, 0], 0.9)
-    np.testing.assert_allclose(side[1, 1], 0.1)
-    np.testing.assert_allclose(side[2, 0], 0.5)  # what the front does not see
-
-
-def test_tilted_views_agree_on_what_they_all_see():
-    turned = synthesis_3d.View(picture(), (1, 0, 0), (0, 1, 1))
-    ways = [*views(picture(), FRONT, SIDE), turned]
-    matrices = synthesis_3d.contributions(ways)
-    s = np.array([0.3, -1.2, 0.7])
-    np.testing.assert_allclose(sum(m @ v.projection @ s for m, v in zip(matrices, ways, strict=True)), s)
-
-
-@pytest.mark.parametrize("planes", [(FRONT,), (FRONT, FRONT), (FRONT, ((0, 1, 0), (1, 0, 0)))])
-def test_views_that_do_not_span_space_are_refused(planes):
-    with pytest.raises(ValueError, match=r"do not span space: none sees the direction \((-?0, ){2}-?1\)"):
-        synthesis_3d.contributions(views(picture(), *planes))
-
-
-@pytest.mark.parametrize("wrong, message", [
-    ({"right": (0, 0, 0)}, "span no plane"), ({"up": (2, 0, 0)}, "span no plane"), ({"weight": 0}, "positive"),
-    ({"exemplar": np.zeros((4, 4, 2), np.float32)}, "zero everywhere"),
-    ({"exemplar": np.ones((4, 4, 3), np.float32)}, "not"),
-])
-def test_a_view_is_checked(wrong, message):
-    with pytest.raises(ValueError, match=message):
-        synthesis_3d.View(**({"exemplar": picture()} | wrong))
+def views_of(I, *planes, weights=(1, 1, 1)):
+    return [View(I, *plane, weight) for plane, weight in zip(planes, weights, strict=False)]
 
 
 def flow(shape, axis=0, towards=2):
@@ -76,7 +37,7 @@ def test_a_field_the_views_agree_on_is_a_fixed_point(search):
     y = np.cos(2 * np.pi * np.arange(8) / 8).astype(np.float32)
     I = np.stack([np.broadcast_to(y[:, None], (8, 8)), np.zeros((8, 8), np.float32)], -1)
     still = np.full((8, 8, 2), 1e-6, np.float32)
-    ways = [synthesis_3d.View(I, *FRONT), synthesis_3d.View(still, *SIDE, 1e-3), synthesis_3d.View(still, *TOP, 1e-3)]
+    ways = [View(I, *FRONT), View(still, *SIDE, 1e-3), View(still, *TOP, 1e-3)]
     settings = synthesis_3d.Settings(levels=1, iterations=2, search=search)
     level = synthesis_3d.Synthesis(ways, (9, 32, 11), settings, 1).levels[0]
     shape = (17, 40, 19)
@@ -92,103 +53,19 @@ def test_a_field_the_views_agree_on_is_a_fixed_point(search):
 @pytest.mark.parametrize("search", ["exact", "k-coherence"])
 def test_the_same_seed_gives_the_same_bits(search):
     I = exemplar.exemplar("sinusoid", 8)
-    ways = views(I, FRONT, SIDE, TOP)
+    ways = views_of(I, FRONT, SIDE, TOP)
     once, again = (first(ways, (7, 9, 10), search=search)[2] for _ in range(2))
     np.testing.assert_array_equal(once, again)
     assert once.shape == (7, 9, 10, 3) and np.isfinite(once).all()
 
 
-def rotations(count, seed=3):
-    """Random rotations (count, 3, 3) float32."""
-    random = np.random.default_rng(seed)
-    found, _ = np.linalg.qr(random.normal(size=(count, 3, 3)))
-    found[np.linalg.det(found) < 0, :, 0] *= -1
-    return found.astype(np.float32)
-
-
-class Bench:
-    """One eye over a field whose every site has a frame of its own."""
-
-    def __init__(self, dimension, shape, dominant, width=5):
-        random = np.random.default_rng(7)
-        size = (6, 7) if dimension == 2 else (3, 4, 5)
-        I = random.normal(size=(*size, dimension)).astype(np.float32)
-        view = synthesis_3d.View(I, (1, 2, 0), (0, 1, 1), 1.5)
-        matrix = random.normal(size=(3, dimension))
-        self.eye = synthesis_3d.Eye(view, I, matrix, width, synthesis_3d.Settings(1, (width,)), dominant)
-        self.field = random.normal(size=(*shape, 3)).astype(np.float32)
-        slices = synthesis_3d.site_grid(shape, width)
-        cells = np.stack(np.meshgrid(*(np.arange(n)[s] for n, s in zip(shape, slices, strict=True)), indexing="ij"), -1)
-        self.grid = cells.shape[:3]
-        self.sites = cells.reshape(-1, 3)[:, ::-1]
-        frames = rotations(len(self.sites)).reshape(*self.grid, 3, 3)
-        self.legs = self.eye.legs(frames)
-        self.on_host = self.legs.get()[..., :3].astype(np.float64)
-        self.position = (random.random((len(self.sites), 2 * dimension - 2)) * 9 - 1).astype(np.float32)[:, :4]
-        if dimension == 3:
-            self.position[:, 3] = 0
-        self.weight = random.random(len(self.sites)).astype(np.float32)
-
-
-BENCHES = pytest.mark.parametrize("dimension, dominant", [(2, False), (2, True), (3, False)])
-SHAPES = pytest.mark.parametrize("shape", [(5, 7, 3), (2, 2, 2), (4, 3, 9)])
-
-
-@BENCHES
-@SHAPES
-def test_gather_and_search_equal_their_references(shape, dimension, dominant):
-    b = Bench(dimension, shape, dominant)
-    match, position, distance = b.eye.search(synthesis_3d.on_device(b.field), b.legs, b.grid, None)
-    seen = synthesis_3d.gather_reference(b.field, b.sites, b.on_host, b.eye.view, 2, float(b.eye.slab), 1)
-    space = b.eye.matcher.space
-    queries = (seen - space.mean) @ space.basis
-    squared = ((queries[:, None] - space.points) ** 2).sum(-1)
-    np.testing.assert_allclose(distance.get(), squared.min(1), rtol=1e-3, atol=1e-3)
-    chosen = squared[np.arange(len(b.sites)), match.get()]
-    np.testing.assert_allclose(chosen, squared.min(1), rtol=1e-3, atol=1e-3)
-    if dimension == 2:  # not further than half a cell along each axis from the cell that matched
-        columns = b.eye.exemplar.shape[1]
-        cell = np.stack([match.get() % columns, match.get() // columns], -1)
-        assert np.abs(position.get() - cell).max() <= 0.5
-    # and from there by k-coherence
-    found, _, distance = b.eye.search(synthesis_3d.on_device(b.field), b.legs, b.grid, match)
-    best, least = synthesis_3d.coherent_reference(space.points, b.eye.matcher.similar.get(), b.eye.exemplar.shape[:-1],
-                                           queries.astype(np.float32), b.sites, b.on_host, b.grid, match.get())
-    np.testing.assert_allclose(distance.get(), least, rtol=1e-3, atol=1e-3)
-    assert (found.get() == best).mean() > 0.95  # equal but for ties to rounding
-
-
-@BENCHES
-@SHAPES
-@pytest.mark.parametrize("eight", [True, False])
-def test_average_equals_its_reference(shape, dimension, dominant, eight):
-    b = Bench(dimension, shape, dominant)
-    out = opencl.empty((*shape, 4))
-    given = (opencl.to_device(b.position), opencl.to_device(b.weight), b.legs, b.grid, synthesis_3d.on_device(b.field), out)
-    b.eye.average(*given, eight, True)
-    expected = synthesis_3d.average_reference(b.eye, b.position, b.weight, b.sites, b.on_host, b.field, eight)
-    np.testing.assert_allclose(out.get()[..., :3], expected, atol=2e-4)
-    # a second view adds to what the first said
-    b.eye.average(*given, eight, False)
-    np.testing.assert_allclose(out.get()[..., :3], 2 * expected, atol=4e-4)
-
-
-@BENCHES
-@SHAPES
-def test_nearest_equals_its_reference(shape, dimension, dominant):
-    b = Bench(dimension, shape, dominant)
-    out = opencl.empty((*shape, 4))
-    b.eye.nearest(opencl.to_device(b.position), b.legs, b.grid, synthesis_3d.on_device(b.field), out, True)
-    expected = synthesis_3d.nearest_reference(b.eye, b.position, b.sites, b.on_host, b.field)
-    np.testing.assert_allclose(out.get()[..., :3], expected, atol=2e-4)
-
-
-@SHAPES
+@pytest.mark.parametrize("shape", [(5, 7, 3), (2, 2, 2), (4, 3, 9)])
 def test_carry_equals_its_reference_and_moves_by_whole_cells_exactly(shape):
     random = np.random.default_rng(2)
     H = random.normal(size=(*shape, 3)).astype(np.float32)
     motion = (2 * random.normal(size=(*shape, 3))).astype(np.float32)
-    np.testing.assert_allclose(synthesis_3d.carry(H, motion), synthesis_3d.carry_reference(H, departure(motion)), atol=1e-5)
+    expected = synthesis_3d.carry_reference(H, departure(motion))
+    np.testing.assert_allclose(synthesis_3d.carry(H, motion), expected, atol=1e-5)
     np.testing.assert_array_equal(synthesis_3d.carry(H, np.zeros_like(motion)), H)
     along_x = np.zeros_like(motion)
     along_x[..., 0] = 1
@@ -213,21 +90,16 @@ def test_a_volume_is_synthesized_from_a_volume():
     # 3D to 3D: one view that sees everything
     z, y, x = np.meshgrid(*[2 * np.pi * np.arange(8) / 8] * 3, indexing="ij")
     I = np.stack([np.cos(y), np.cos(z), np.cos(x)], -1).astype(np.float32)
-    _, _, H = first([synthesis_3d.View(I)], (9, 8, 10), search="exact")
+    _, _, H = first([View(I)], (9, 8, 10), search="exact")
     assert np.sqrt(np.mean(H**2)) == pytest.approx(np.sqrt(np.mean(I**2)), rel=0.2)
     quarter = np.sqrt(np.mean((np.diff(H, axis=2)) ** 2, axis=(0, 1, 2)))
     expected = np.sqrt(np.mean((np.diff(I, axis=2, append=I[:, :, :1])) ** 2, axis=(0, 1, 2)))
     np.testing.assert_allclose(quarter, expected, atol=0.2)
 
 
-def test_a_volume_too_large_for_an_exemplar_is_refused():
-    with pytest.raises(ValueError, match="too large an exemplar"):
-        synthesis_3d.exemplar_blocks(np.ones((64, 64, 64, 3), np.float32), 4)
-
-
 def test_motifs_do_not_die_out_under_a_dominating_view():
     I = exemplar.exemplar("heart", 16)
-    ways = views(I, FRONT, SIDE, TOP, weights=(1, 0.05, 0.05))
+    ways = views_of(I, FRONT, SIDE, TOP, weights=(1, 0.05, 0.05))
     _, _, H = first(ways, (20, 40, 40), levels=2, neighborhoods=(17, 9), search="exact")
     seen = np.sqrt(np.mean(H[..., :2] ** 2))
     assert 0.75 < seen / np.sqrt(np.mean(I**2)) < 1.15
@@ -236,7 +108,7 @@ def test_motifs_do_not_die_out_under_a_dominating_view():
 def test_frames_follow_each_other_and_stay_steady_under_a_constant_flow():
     I = exemplar.exemplar("sinusoid", 8)
     settings = synthesis_3d.Settings(levels=1, iterations=2)
-    synthesis = synthesis_3d.Synthesis(views(I, FRONT, SIDE, TOP), (12, 12, 12), settings, 1)
+    synthesis = synthesis_3d.Synthesis(views_of(I, FRONT, SIDE, TOP), (12, 12, 12), settings, 1)
     L, T = flow((12, 12, 12))
     state, changes = None, []
     for _ in range(6):
@@ -251,7 +123,7 @@ def test_frames_follow_each_other_and_stay_steady_under_a_constant_flow():
 
 def test_the_memory_it_says_it_needs_grows_with_the_voxels():
     I = exemplar.exemplar("sinusoid", 8)
-    ways = views(I, FRONT, SIDE, TOP)
+    ways = views_of(I, FRONT, SIDE, TOP)
     small, large = (synthesis_3d.memory_needed(ways, (n, n, n), synthesis_3d.Settings(3)) for n in (64, 256))
     assert 20 < large / small < 64
     assert 1e9 < synthesis_3d.memory_needed(ways, (256, 64, 256), synthesis_3d.Settings(3)) < 4e9
@@ -263,7 +135,7 @@ def test_nothing_flows_through_a_wall():
     distance = np.broadcast_to((np.arange(16, dtype=np.float32) - 6)[:, None], shape)
     I = exemplar.exemplar("sinusoid", 8)
     settings = synthesis_3d.Settings(levels=1, iterations=3)
-    synthesis = synthesis_3d.Synthesis(views(I, SIDE, TOP, FRONT), shape, settings, 1, distance)
+    synthesis = synthesis_3d.Synthesis(views_of(I, SIDE, TOP, FRONT), shape, settings, 1, distance)
     L, T = flow(shape)
     H = synthesis.visible(synthesis.frame(L, T, None))  # the frame is the domain's own
     assert np.abs(H[:, 6, :, 1]).max() < 0.02 * np.sqrt(np.mean(np.sum(H**2, -1)))
