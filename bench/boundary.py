@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from bench.machine import ROOT
 from pipeline.files import pictures
-from pipeline.schema import PROJECT_SCENES
 from synth import obstacle, wake
 from synth.motion.detail import Settings, enough_levels, synthesize
 from synth.motion.exemplar import exemplar, from_bitmap
-from synth.motion.local_axes import local_frame, to_world
+from synth.motion.local_axes import axes_2d, to_world
 from synth.motion.quality import measure
 from synth.particles import sampled
 from synth.projection import divergence, project
@@ -39,7 +39,7 @@ def through_the_wall(H: np.ndarray) -> np.ndarray:
 
 def texture() -> list[dict[str, Any]]:
     """Each exemplar with the boundary observed and not."""
-    gravel = from_bitmap(pictures.read_grey(PROJECT_SCENES / "assets" / "gravel.png", "exemplar.file"), 64)
+    gravel = from_bitmap(pictures.read_grey(ROOT / "scenes" / "assets" / "gravel.png", "exemplar.file"), 64)
     distance = obstacle.ball(SHAPE, CENTRE, RADIUS).distance
     rows = []
     for name, I in {"gravel": gravel, "circle": exemplar("circle", 64), "sinusoid": exemplar("sinusoid", 64)}.items():
@@ -48,10 +48,10 @@ def texture() -> list[dict[str, Any]]:
             every = synthesize(I, L, SHAPE, Settings(enough_levels(64)), 1, distance if observed else None)
             for frame, H in enumerate(every, start=1):
                 if frame in FRAMES:
-                    local = local_frame(L[frame - 1])
+                    axes = axes_2d(L[frame - 1])
                     rms = float(np.sqrt(np.mean(np.sum(H.astype(np.float64) ** 2, axis=-1))))
-                    wall = through_the_wall(to_world(H, local)) / rms
-                    quality = {key: round(value, 3) for key, value in asdict(measure(H, local, I)).items()}
+                    wall = through_the_wall(to_world(H, axes)) / rms
+                    quality = {key: round(value, 3) for key, value in asdict(measure(H, axes, I)).items()}
                     rows.append({"exemplar": name, "boundary": "observed" if observed else "not", "frame": frame,
                                  "wall, rms": round(float(np.sqrt(np.mean(wall**2))), 4),
                                  "wall, largest": round(float(np.abs(wall).max()), 4), **quality})

@@ -1,5 +1,5 @@
 """The density window side by side with SciPy: 256 x 256 x 64 cells, m = 16, in one process (ma09 pseudocode
-4); and that of ma09 figure 5, 96 x 128 x 96 cells, its detail riding on L as the pipeline carries it.
+4); and that of ma09 figure 5, 96 x 128 x 96 cells, its detail carried along L as the pipeline does it.
 
 `python -m bench.density [--frames N] [--small]` prints one JSON object. SciPy does what the pseudocode says
 with `map_coordinates(order=1)`: m gathers per frame from departure points that were found beforehand, and
@@ -83,7 +83,7 @@ def main() -> None:
         "seconds a frame": round(median, 3), "fastest": round(min(seconds), 3),
         "slowest": round(max(seconds), 3), "processor seconds a frame": round(busy, 3),
         "scipy, seconds a frame": round(reference, 3),
-        "times faster": round(reference / median, 1), "reach": "1.5 s a frame, 6 times",
+        "times faster": round(reference / median, 1), "target": "1.5 s a frame, 6 times",
         "peak memory MB": peak // 1024, "of it for the inputs MB": before // 1024,
         "device": opencl.description()}
     row["plume"] = plume((24, 32, 24) if chosen.small else (96, 128, 96), chosen.frames)
@@ -95,7 +95,8 @@ def plume(shape: tuple[int, int, int], frames: int) -> dict[str, Any]:
     L, F = motions(shape)
     carried = [Carried(f, l) for f, l in zip(F, L, strict=True)]
     seconds, busy = ours(L, carried, [Source((0.0, 0.4), 0.33, streaks=0.5)], frames)
-    return {"what": f"    {shape[2]}x{shape[1]}x{shape[0]}, detail that rides, half full of smoke",
+    cells = f"{shape[2]}x{shape[1]}x{shape[0]}"
+    return {"what": f"density window {cells}, m = {M}, the detail carried along L, half full of smoke",
             "seconds a frame": round(float(np.median(seconds)), 3), "processor seconds a frame": round(busy, 3)}
 
 

@@ -18,18 +18,20 @@ from typing import Any
 
 import numpy as np
 
+from bench import plot
 from bench.machine import peak_memory
 from bench.synthesis import timed
+from pipeline.files import atomic
 from synth.elements import (
     arrangement,
     bundle,
+    falling_paper,
     fidelity,
-    handmade,
     initialize,
+    keyframed,
     neighborhood,
     orientation,
     school,
-    scraps,
     search,
     simulation,
     synthesis,
@@ -37,7 +39,7 @@ from synth.elements import (
 from synth.elements.constraints import Constraints, Domain
 from synth.elements.neighborhood import Shape
 from synth.elements.samples import Elements
-from synth.elements.synthesis import Guides, Settings
+from synth.elements.synthesis import Controls, Settings
 
 FRAMES = 60
 COUNTS = (500, 1000, 2000, 4000, 8000)
@@ -67,12 +69,13 @@ def turning(edge: float) -> synthesis.Flow:
     return flow
 
 
-def converged(within: search.Exemplar, start: initialize.Copied, guides: Guides, settings: Settings) -> dict[str, Any]:
+def converged(within: search.Exemplar, start: initialize.Copied, controls: Controls,
+              settings: Settings) -> dict[str, Any]:
     """Times and energies until the energy stays."""
     energies: list[float] = []
 
     def run() -> np.ndarray:
-        for optimizer in synthesis.together(within, start.elements, start.source, guides,
+        for optimizer in synthesis.together(within, start.elements, start.source, controls,
                                             replace(settings, iterations=MOST)):
             energies.append(optimizer.energies[-1])
             if len(energies) > 1 and energies[-2] - energies[-1] < CONVERGED * energies[-2]:
@@ -92,28 +95,28 @@ def particles(count: int = 1000, frames: int = FRAMES) -> dict[str, Any]:
     within = search.exemplar(exemplar, Shape(2.0, 1, 1, sigma=4.0), period=exemplar.period)
     flow = turning(edge)
     start = initialize.carried(initialize.points(exemplar, square(edge), frames, 2.0, 1.0, 1, count=count), flow)
-    return converged(within, start, Guides(Constraints(square(edge)), flow), Settings())
+    return converged(within, start, Controls(Constraints(square(edge)), flow), Settings())
 
 
 def noodles() -> dict[str, Any]:
     """200 noodles of 40 samples, 60 frames, that do not pass through each other."""
-    exemplar = handmade.jagged(frames=FRAMES)
+    exemplar = keyframed.jagged(frames=FRAMES)
     curve_ = simulation.lifted(FRAMES, length=100.0, thick=8.5)
     coarse = bundle.duplicated(curve_, 200).positions
     inner, outer = orientation.along_threads(exemplar.coarse), orientation.along_threads(coarse)
     within = search.exemplar(exemplar, Shape(3.0, 3, 3), inner)
     start = initialize.on_coarse(exemplar, coarse, inner, outer, 9, 1, 24.0)
-    return converged(within, start, Guides(frames=outer), Settings(hybrid=True))
+    return converged(within, start, Controls(axes=outer), Settings(hybrid=True))
 
 
 def sheets() -> dict[str, Any]:
     """300 sheets of 7×7 samples, 60 frames."""
-    exemplar = handmade.folded(frames=FRAMES)
-    coarse = scraps.tossed(300, FRAMES).positions
+    exemplar = keyframed.folded(frames=FRAMES)
+    coarse = falling_paper.tossed(300, FRAMES).positions
     inner, outer = (orientation.on_sheets(c, exemplar.grid) for c in (exemplar.coarse, coarse))
     within = search.exemplar(exemplar, Shape(3.0, 5, 4), inner)
     start = initialize.on_coarse(exemplar, coarse, inner, outer, 1, 1, 24.0)
-    return converged(within, start, Guides(frames=outer), Settings())
+    return converged(within, start, Controls(axes=outer), Settings())
 
 
 CASES: dict[str, Callable[[], dict[str, Any]]] = {
@@ -129,15 +132,15 @@ def growth() -> dict[str, Any]:
         edge = float(np.sqrt(count / exemplar.count * 100))
         within = search.exemplar(exemplar, Shape(2.0, 1, 1, sigma=4.0), period=exemplar.period)
         start = initialize.points(exemplar, square(edge), GROWTH_FRAMES, 2.0, 1.0, 1, count=count)
-        run = synthesis.together(within, start.elements, start.source, Guides(Constraints(square(edge))), Settings())
+        run = synthesis.together(within, start.elements, start.source, Controls(Constraints(square(edge))), Settings())
         next(run)  # builds the kernels
         before = time.process_time()
         next(run)
         took[count] = time.process_time() - before
     exponent = float(np.polyfit(np.log(list(took)), np.log(list(took.values())), 1)[0])
-    CURVE.parent.mkdir(exist_ok=True)
-    CURVE.write_text(plotted(f"processor seconds of an iteration ~ elements^{exponent:.2f}", "elements", {
-        "": (np.array(list(took)), np.array(list(took.values())))}, True), encoding="utf-8")
+    curve = plot.Curve(np.array(list(took)), np.array(list(took.values())), [f"{count}" for count in took])
+    atomic.write_text(CURVE, plot.svg(f"one iteration: time ~ elements^{exponent:.2f}", "elements", "processor seconds",
+                                      {"": curve}, log_x=True))
     return {"processor s of an iteration": {f"{n}": round(s, 3) for n, s in took.items()},
             "exponent": round(exponent, 3)}
 
@@ -170,11 +173,12 @@ def own_domain(name: str, exemplar: Elements, shape: Shape, frames: int) -> dict
     within = search.exemplar(exemplar, shape, period=period)
     spacing = neighborhood.spacing(exemplar.positions, period)
     start = initialize.points(exemplar, whole, frames, shape.radius, spacing, 1, count=exemplar.count)
-    *_, last = synthesis.together(within, start.elements, start.source, Guides(period=period), Settings(iterations=12))
+    *_, last = synthesis.together(within, start.elements, start.source, Controls(period=period),
+                                  Settings(iterations=12))
     given = fidelity.statistics(exemplar.positions, spacing, period)
     found = fidelity.statistics(last.result().positions, spacing, period)
-    return {"exemplar": name, "pair correlation": round(fidelity.apart(given.correlation, found.correlation), 3),
-            "motion spectrum": round(fidelity.apart(given.spectrum, found.spectrum), 3),
+    return {"exemplar": name, "pair correlation": round(fidelity.difference(given.correlation, found.correlation), 3),
+            "motion spectrum": round(fidelity.difference(given.spectrum, found.spectrum), 3),
             "nearest distance": round(abs(found.nearest / given.nearest - 1), 3),
             "jitter over the exemplar's": round(fidelity.jitter(last.result().positions)
                                                 / max(fidelity.jitter(exemplar.positions), 1e-12), 2)
@@ -194,45 +198,26 @@ def own_domains() -> list[dict[str, Any]]:
 
 
 def jitter() -> dict[str, Any]:
-    """Mean squared acceleration of the basic synthesis (§4.1), of the smooth one (§4.2), and with motion that counts,
-    on a small exemplar in a flow; in squared spacings per frame⁴."""
+    """Mean squared acceleration of the basic synthesis (§4.1), of the smooth one (§4.2), and with motion weighted, on a
+    small exemplar in a flow; in squared spacings per frame⁴."""
     exemplar, edge, frames = arrangement.jittered_grid((5, 5), seed=2), 18.0, 24
     flow = turning(edge)
-    ways = {"basic (§4.1)": (1, np.inf, 1.0), "smooth (§4.2)": (2, 1.8**2, 1.0),
-            "smooth, and motion counts": (2, 1.8**2, search.AT_REST)}
+    unweighted = Shape(1.8, 1, 1, at_rest=1.0)
+    variants = {"basic (§4.1)": (1, unweighted), "smooth (§4.2)": (2, replace(unweighted, sigma=1.8**2)),
+                "smooth, motion weighted": (2, Shape(1.8, 1, 1, sigma=1.8**2))}
     found, curves = {}, {}
-    kept = search.AT_REST
-    for name, (n, sigma, rest) in ways.items():
-        search.AT_REST = rest
-        within = search.exemplar(exemplar, Shape(1.8, 1, 1, sigma=sigma), period=exemplar.period)
+    for name, (n, shape) in variants.items():
+        within = search.exemplar(exemplar, shape, period=exemplar.period)
         start = initialize.carried(initialize.points(exemplar, square(edge), frames, 1.8, 1.0, 1), flow)
-        *_, last = synthesis.together(within, start.elements, start.source, Guides(Constraints(square(edge)), flow),
+        *_, last = synthesis.together(within, start.elements, start.source, Controls(Constraints(square(edge)), flow),
                                       Settings(iterations=8, n=n, coherent=False))
         positions = last.result().positions.astype(np.float64)
         found[name] = fidelity.jitter(positions)
         rms = np.sqrt(np.mean(np.sum(np.diff(positions, n=2, axis=0) ** 2, axis=-1), axis=(1, 2)))
-        curves[name] = np.arange(2, frames), rms
-    search.AT_REST = kept
-    JITTER.write_text(plotted("rms acceleration, spacings per frame²", "frame", curves, False), encoding="utf-8")
+        curves[name] = plot.Curve(np.arange(2, frames), rms)
+    atomic.write_text(JITTER, plot.svg("jitter in a flow", "frame", "rms acceleration, spacings per frame²", curves,
+                                       log_x=False))
     return {name: float(f"{value:.3g}") for name, value in found.items()}
-
-
-def plotted(title: str, along: str, curves: dict[str, tuple[np.ndarray, np.ndarray]], log_x: bool) -> str:
-    """Curves (x, y) by name, y logarithmic, as an SVG of 560×330."""
-    x_of = np.log10 if log_x else np.asarray
-    low, high = min(float(y.min()) for _, y in curves.values()), max(float(y.max()) for _, y in curves.values())
-    first, last = min(float(x.min()) for x, _ in curves.values()), max(float(x.max()) for x, _ in curves.values())
-    drawn = ['<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 560 330" font-family="serif" font-size="13">',
-             '<rect width="560" height="330" fill="white"/>', f'<text x="60" y="20">{title}</text>',
-             f'<text x="60" y="322">{along}, from {first:g} to {last:g}; upwards from {low:.2g} to {high:.2g}</text>']
-    for number, (name, (x, y)) in enumerate(curves.items()):
-        at = np.interp(x_of(x), x_of(np.array([first, last])), [60, 520])
-        up = np.interp(np.log10(y), np.log10([low, high]), [295, 40])
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(at, up, strict=True))
-        colour = ("#a33", "#36a", "#283")[number % 3]
-        drawn.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
-        drawn.append(f'<text x="330" y="{40 + 18 * number}" fill="{colour}">{name}</text>')
-    return "\n".join([*drawn, "</svg>", ""])
 
 
 def main() -> None:

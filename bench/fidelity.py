@@ -40,11 +40,11 @@ def row(example: Elements, output: Elements, given: Seen, found: Seen) -> dict[s
     """How far three statistics are off, and the output's jitter over the exemplar's; threads that cross."""
     moves = len(given.statistics.spectrum) > 0
     threads = example.topology == "thread"
+    theirs, ours = given.statistics, found.statistics
     return {"elements": output.count,
-            "pair correlation": round(fidelity.apart(given.statistics.correlation, found.statistics.correlation), 3),
-            "motion spectrum": round(fidelity.apart(given.statistics.spectrum, found.statistics.spectrum), 3)
-            if moves else None,
-            "nearest distance": round(abs(found.statistics.nearest / given.statistics.nearest - 1), 3),
+            "pair correlation": round(fidelity.difference(theirs.correlation, ours.correlation), 3),
+            "motion spectrum": round(fidelity.difference(theirs.spectrum, ours.spectrum), 3) if moves else None,
+            "nearest distance": round(abs(ours.nearest / theirs.nearest - 1), 3),
             "jitter over the exemplar's": round(fidelity.jitter(found.motion) / fidelity.jitter(given.motion), 2)
             if moves else None,
             "crossing threads a frame": crossed(output) if threads else None,
@@ -89,11 +89,11 @@ def of_sheets(elements: Elements) -> Seen:
 
 
 def details(elements: Elements) -> np.ndarray:
-    """What samples do beside the coarse motion, in their local frames: (T, E·S, 1, D)."""
+    """What samples do beside the coarse motion, in their local axes: (T, E·S, 1, D)."""
     assert elements.coarse is not None
-    frames = orientation.along(elements.coarse, elements.grid)
+    axes = orientation.along(elements.coarse, elements.grid)
     moved = (elements.positions - elements.coarse).reshape(-1, 3)
-    return np.einsum("nji,nj->ni", frames, moved).reshape(elements.frames, -1, 1, 3)
+    return np.einsum("nji,nj->ni", axes, moved).reshape(elements.frames, -1, 1, 3)
 
 
 def rows_of(file: Path) -> list[dict[str, Any]]:

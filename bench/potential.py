@@ -9,25 +9,25 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bench.flows import wave
+from bench.machine import ROOT
 from bench.quality import CLOSED
 from bench.synthesis import timed
 from pipeline.files import pictures
 from synth.motion import detail, potential
 from synth.motion.detail import Settings, enough_levels
 from synth.motion.exemplar import exemplar, from_bitmap
-from synth.motion.local_axes import local_frame, to_world
+from synth.motion.local_axes import axes_2d, to_world
 from synth.motion.quality import measure, whole_motifs
 from synth.projection import divergence
 
 SIZE, OUTPUT = 64, 256
 EXEMPLARS = ("heart", "square", "stripes", "sinusoid", "brick")
-WAYS = {"motion": detail.Synthesis, "potential": potential.Synthesis}
+VARIANTS = {"motion": detail.Synthesis, "potential": potential.Synthesis}
 
 
 def relative_divergence(world: np.ndarray) -> float:
@@ -36,31 +36,31 @@ def relative_divergence(world: np.ndarray) -> float:
     return float(np.sqrt(np.mean(divergence(world)[1:-1, 1:-1] ** 2) / slopes))
 
 
-def row(name: str, way: str) -> dict[str, Any]:
+def row(name: str, variant: str) -> dict[str, Any]:
     """The numbers of one synthesis."""
     if name == "brick":
-        grey = pictures.read_grey(Path(__file__).parents[1] / "scenes/assets/brick.png", "exemplar.file")
+        grey = pictures.read_grey(ROOT / "scenes" / "assets" / "brick.png", "exemplar.file")
         I = from_bitmap(grey, SIZE)
     else:
         I = exemplar(name, SIZE)
     L = wave(OUTPUT)
-    synthesis = WAYS[way](I, L.shape[:2], Settings(enough_levels(SIZE)), 1)
+    synthesis = VARIANTS[variant](I, L.shape[:2], Settings(enough_levels(SIZE)), 1)
     state, first = timed(lambda: synthesis.frame(L, None))
     _, after = timed(lambda: synthesis.frame(L, state))
-    H, frame = synthesis.visible(state), local_frame(L)
-    numbers = {key: round(value, 3) for key, value in asdict(measure(H, frame, I)).items()}
-    whole, motifs = whole_motifs(H, frame, I) if name in CLOSED else (None, None)
-    return {"exemplar": name, "synthesized": way, "lost": round(potential.potential(I)[1], 3), **numbers,
-            "whole": whole, "motifs": motifs, "divergence": float(f"{relative_divergence(to_world(H, frame)):.1e}"),
+    H, axes = synthesis.visible(state), axes_2d(L)
+    numbers = {key: round(value, 3) for key, value in asdict(measure(H, axes, I)).items()}
+    whole, motifs = whole_motifs(H, axes, I) if name in CLOSED else (None, None)
+    return {"exemplar": name, "synthesized": variant, "lost": round(potential.potential(I)[1], 3), **numbers,
+            "whole": whole, "motifs": motifs, "divergence": float(f"{relative_divergence(to_world(H, axes)):.1e}"),
             "first, processor s": round(first["processor"], 2), "next": round(after["processor"], 2)}
 
 
 def main() -> None:
     rows = []
-    for way in WAYS:  # the kernels are built before they are timed
-        row(EXEMPLARS[0], way)
+    for variant in VARIANTS:  # the kernels are built before they are timed
+        row(EXEMPLARS[0], variant)
     for name in EXEMPLARS:
-        rows += [row(name, way) for way in WAYS]
+        rows += [row(name, variant) for variant in VARIANTS]
         print(f"  potential of {name} done", file=sys.stderr, flush=True)
     print(json.dumps({"motion and potential": rows}, indent=1))
 

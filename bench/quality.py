@@ -20,7 +20,7 @@ from bench.flows import FLOWS
 from synth.motion import detail, initialize
 from synth.motion.detail import Settings, enough_levels, synthesize
 from synth.motion.exemplar import KINDS, exemplar
-from synth.motion.local_axes import local_frame
+from synth.motion.local_axes import axes_2d
 from synth.motion.quality import measure, whole_motifs
 
 SIZES = (16, 32, 48, 64, 128)
@@ -32,9 +32,9 @@ def row(kind: str, size: int, flow: str, levels: int | None = None, seed: int = 
     I, L = exemplar(kind, size), FLOWS[flow](min(max(128, 4 * size), 512))
     levels = levels or enough_levels(size)
     H = next(synthesize(I, [L], L.shape[:2], Settings(levels, **settings), seed))
-    frame = local_frame(L)
-    numbers = {key: round(value, 3) for key, value in asdict(measure(H, frame, I)).items()}
-    whole, motifs = whole_motifs(H, frame, I) if kind in CLOSED else (None, None)
+    axes = axes_2d(L)
+    numbers = {key: round(value, 3) for key, value in asdict(measure(H, axes, I)).items()}
+    whole, motifs = whole_motifs(H, axes, I) if kind in CLOSED else (None, None)
     return {"exemplar": kind, "size": size, "flow": flow, **numbers, "whole": whole, "motifs": motifs}
 
 
@@ -44,11 +44,11 @@ def met(found: dict[str, Any]) -> bool:
     return 0.85 <= found["rms"] <= 1.15 and found["used"] >= 0.45 and closed
 
 
-def _random_starts(exemplar: np.ndarray, frame: np.ndarray, randoms: Sequence[np.random.Generator]) -> list[np.ndarray]:
-    return [initialize.random_pixels(exemplar, frame.shape[:2], random) for random in randoms]
+def _random_starts(exemplar: np.ndarray, axes: np.ndarray, randoms: Sequence[np.random.Generator]) -> list[np.ndarray]:
+    return [initialize.random_pixels(exemplar, axes.shape[:2], random) for random in randoms]
 
 
-def _not_sown(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray:
+def _not_sown(H: np.ndarray, exemplar: np.ndarray, axes: np.ndarray) -> np.ndarray:
     return H
 
 

@@ -60,12 +60,12 @@ def iteration(H: np.ndarray, exemplar: np.ndarray, frame: np.ndarray, near: Neig
     distance, match = near.tree.query((patches - near.mean) @ near.basis, workers=-1)
     weight = (1 + distance**2 / patches.shape[1] / (EXACT * rms) ** 2) ** (ROBUST / 2 - 1)
 
-    reach = int(np.ceil(np.sqrt(2) * radius))
-    span = np.arange(-reach, reach + 1)
-    way_y, way_x = (g.ravel() for g in np.meshgrid(span, span, indexing="ij"))
+    extent = int(np.ceil(np.sqrt(2) * radius))
+    span = np.arange(-extent, extent + 1)
+    offset_y, offset_x = (g.ravel() for g in np.meshgrid(span, span, indexing="ij"))
     # a cell's offset in the site's frame: the turn undone
-    o_x, o_y = turned(axis * [1, -1], way_x, way_y)
-    cell_x, cell_y = x[:, None] + way_x, y[:, None] + way_y
+    o_x, o_y = turned(axis * [1, -1], offset_x, offset_y)
+    cell_x, cell_y = x[:, None] + offset_x, y[:, None] + offset_y
     covered = ((np.maximum(np.abs(o_x), np.abs(o_y)) <= radius + 1e-3) & (cell_x >= 0) & (cell_x < columns)
                & (cell_y >= 0) & (cell_y < rows))
     site = np.nonzero(covered)[0]
@@ -97,8 +97,9 @@ def owners(cells: np.ndarray, centres: np.ndarray, frame: np.ndarray) -> tuple[n
     index = index.reshape(len(cells), -1)
     at = np.rint(centres).astype(int)
     e = frame[np.clip(at[:, 1], 0, frame.shape[0] - 1), np.clip(at[:, 0], 0, frame.shape[1] - 1)][index]
-    way = (cells[:, None] - centres[index]).reshape(-1, 2, 1)
-    offset = np.stack(turned(e.reshape(-1, 2) * [1, -1], way[:, 0], way[:, 1]), axis=-1).reshape(*index.shape, 2)
+    displacement = (cells[:, None] - centres[index]).reshape(-1, 2, 1)
+    offset = np.stack(turned(e.reshape(-1, 2) * [1, -1], displacement[:, 0], displacement[:, 1]), axis=-1)
+    offset = offset.reshape(*index.shape, 2)
     nearest = np.abs(offset).max(axis=-1).argmin(axis=1)
     rows = np.arange(len(cells))
     return index[rows, nearest], offset[rows, nearest]

@@ -20,17 +20,17 @@ from bench.flows import wave
 from synth.elements import (
     arrangement,
     bundle,
-    handmade,
+    falling_paper,
     initialize,
+    keyframed,
     orientation,
-    scraps,
     search,
     simulation,
     synthesis,
 )
 from synth.elements.constraints import Constraints
 from synth.elements.neighborhood import Shape
-from synth.elements.synthesis import Guides
+from synth.elements.synthesis import Controls
 from synth.elements.synthesis import Settings as Synthesis
 from synth.motion.detail import Settings, synthesize
 from synth.motion.exemplar import exemplar
@@ -43,18 +43,18 @@ def elements() -> Iterator[np.ndarray]:
     grid = arrangement.jittered_grid((6, 6), seed=1)
     points = search.exemplar(grid, Shape(2.0, 1, 1, sigma=4.0), period=grid.period)
     start = initialize.points(grid, square(12.0), 6, 2.0, 1.0, 1)
-    cases = [(points, start, Guides(Constraints(square(12.0)), turning(12.0)), False)]
+    cases = [(points, start, Controls(Constraints(square(12.0)), turning(12.0)), False)]
     bundled = bundle.duplicated(simulation.lifted(60, length=40.0, thick=4.0), 30).positions[:8]
-    tossed = scraps.tossed(20, 8).positions
-    for example, coarse, frames_of, many in (
-            (handmade.jagged(frames=12), bundled, orientation.along_threads, 9),
-            (handmade.folded(frames=12), tossed, lambda sheets: orientation.on_sheets(sheets, (7, 7)), 1)):
-        inner, outer = frames_of(example.coarse), frames_of(coarse)
+    tossed = falling_paper.tossed(20, 8).positions
+    for example, coarse, axes_of, many in (
+            (keyframed.jagged(frames=12), bundled, orientation.along_threads, 9),
+            (keyframed.folded(frames=12), tossed, lambda sheets: orientation.on_sheets(sheets, (7, 7)), 1)):
+        inner, outer = axes_of(example.coarse), axes_of(coarse)
         start = initialize.on_coarse(example, coarse, inner, outer, many, 1, 24.0)
-        cases.append((search.exemplar(example, Shape(3.0, 2, 2), inner), start, Guides(frames=outer), many > 1))
-    for within, start, guided, hybrid in cases:
+        cases.append((search.exemplar(example, Shape(3.0, 2, 2), inner), start, Controls(axes=outer), many > 1))
+    for within, start, controls, hybrid in cases:
         settings = Synthesis(iterations=2, hybrid=hybrid)
-        *_, last = synthesis.together(within, start.elements, start.source, guided, settings)
+        *_, last = synthesis.together(within, start.elements, start.source, controls, settings)
         yield last.result().positions
 
 
@@ -63,8 +63,8 @@ def digest() -> str:
     found = hashlib.sha256()
     for positions in elements():
         found.update(positions.tobytes())
-    for way in ("exact", "k-coherence"):
-        for H in synthesize(exemplar("heart", 32), [wave(128)] * 2, (128, 128), Settings(3, search=way), seed=1):
+    for matching in ("exact", "k-coherence"):
+        for H in synthesize(exemplar("heart", 32), [wave(128)] * 2, (128, 128), Settings(3, search=matching), seed=1):
             found.update(H.tobytes())
     return found.hexdigest()
 

@@ -3,8 +3,8 @@
 `python -m bench.smoke [--small]` prints one JSON object. The plume is simulated on 24² x 32 and carried on with curl
 noise. Errors are root mean squares over the picture's mean, in linear light, at a quarter of the size, where many
 paths are affordable; the noise of the path-traced truth is taken out of them. Cycles, where blender is on the PATH,
-renders the same VDB under the same lights in an empty room; both are compared with a rival of their own of another
-seed, and its time at volpath's noise is what its own squared noise says.
+renders the same VDB under the same lights in an empty room; the noise of each renderer is measured between two
+pictures with different seeds, and their costs are compared at equal noise: time × squared noise.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ print("took", time.time() - start)
 
 def cycles(density: np.ndarray, voxel: float, origin: tuple[float, float, float], settings: smoke.VolumeSettings,
            spp: int, seed: int, folder: Path) -> tuple[np.ndarray, float]:
-    """The density in Cycles under key, rim and sky, without a stage: linear light (h, w, 3), seconds."""
+    """The density in Cycles under key, rim and sky, without a backdrop: linear light (h, w, 3), seconds."""
     vdb, exr, script = folder / "smoke.vdb", folder / f"{seed}.exr", folder / "cycles.py"
     volumes.write(vdb, {"density": Field(density, voxel, origin)})
     script.write_text(CYCLES)
@@ -185,7 +185,7 @@ def main() -> None:
     settings = smoke.VolumeSettings(width=width, height=height, spp=DRAFT_SPP, bowl=(0.15, 0.085))
     marching = dataclasses.replace(settings, method="march")
     row: dict[str, Any] = {"what": f"smoke 96²×128 at {width}×{height}"}
-    _, row["stage, once"] = timed(lambda: smoke.empty_stage(settings))
+    _, row["empty studio, once"] = timed(lambda: smoke.empty_studio(settings))
     smoke.volume(density, voxel, origin, marching)  # builds the kernels
     row["march"] = min((timed(lambda: smoke.volume(density, voxel, origin, marching))[1] for _ in range(3)),
                        key=lambda times: times["wall"])

@@ -14,11 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from bench import plot
 from bench.machine import peak_memory
 from bench.synthesis import timed
+from pipeline.files import atomic
 from synth.motion.exemplar import exemplar
 from synth.motion.quality import measure_view
-from synth.motion.synthesis_3d import Settings, Synthesis, View
+from synth.motion.synthesis_3d import Settings, Synthesis
+from synth.motion.views import View
 
 PLANES = {"front": ((1, 0, 0), (0, 1, 0)), "side": ((0, 0, 1), (0, 1, 0)), "top": ((1, 0, 0), (0, 0, 1))}
 FIGURE_9 = (256, 64, 256)
@@ -53,23 +56,10 @@ def growth() -> dict[str, Any]:
     """Processor seconds of the first frame from 64³ to 256³, and the exponent in the number of voxels."""
     took = {edge: frames((edge,) * 3, False)["first"]["processor"] for edge in EDGES}
     exponent = np.polyfit(np.log([edge**3 for edge in took]), np.log(list(took.values())), 1)[0]
-    CURVE.parent.mkdir(exist_ok=True)
-    CURVE.write_text(curve(took, float(exponent)), encoding="utf-8")
+    curve = plot.Curve(np.array([edge**3 for edge in took]), np.array(list(took.values())), [f"{e}³" for e in took])
+    atomic.write_text(CURVE, plot.svg(f"first frame: time ~ voxels^{exponent:.2f}", "voxels", "processor seconds",
+                                      {"": curve}, log_x=True))
     return {"processor s": {f"{edge}³": round(s, 1) for edge, s in took.items()}, "exponent": round(float(exponent), 3)}
-
-
-def curve(took: dict[int, float], exponent: float) -> str:
-    """Seconds over voxels, both logarithmic, as SVG."""
-    x = np.interp(np.log([e**3 for e in took]), np.log([50**3, 320**3]), [60, 460])
-    y = np.interp(np.log(list(took.values())), np.log([0.5, 500]), [280, 20])
-    line = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-    marks = "".join(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="4"/><text x="{a:.1f}" y="300">{edge}³</text>'
-                    f'<text x="{a:.1f}" y="{b - 10:.1f}">{s:.0f} s</text>'
-                    for a, b, (edge, s) in zip(x, y, took.items(), strict=True))
-    return ('<svg xmlns="http://www.w3.org/2000/svg" width="500" height="340" font-family="sans-serif" font-size="12" '
-            f'text-anchor="middle"><rect width="500" height="340" fill="white"/><polyline points="{line}" fill="none" '
-            f'stroke="black"/>{marks}<text x="260" y="325">voxels; first frame, processor seconds ~ '
-            f'voxels^{exponent:.2f}</text></svg>\n')
 
 
 def quality() -> list[dict[str, Any]]:
@@ -82,9 +72,9 @@ def quality() -> list[dict[str, Any]]:
             synthesis = Synthesis(views, (64, 64, 64), Settings(int(np.log2(size / 8)) + 1, widths, search=search), 1)
             L, towards = flow((64, 64, 64))
             state, took = timed(lambda: synthesis.frame(L, towards, None))  # noqa: B023  # called at once
-            frame = np.broadcast_to(np.eye(3, dtype=np.float32), (64, 64, 64, 3, 3))
+            axes = np.broadcast_to(np.eye(3, dtype=np.float32), (64, 64, 64, 3, 3))
             for plane, view in list(zip(PLANES, views, strict=True))[: 3 if min(weights) == 1 else 1]:
-                numbers = asdict(measure_view(synthesis.visible(state), frame, view))
+                numbers = asdict(measure_view(synthesis.visible(state), axes, view))
                 rows.append({"exemplar": name, "search": search, "view": plane,
                              **{key: round(value, 3) for key, value in numbers.items()},
                              "processor s": round(took["processor"], 1)})

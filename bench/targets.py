@@ -1,0 +1,191 @@
+"""What each part is measured against: rows of the measured number, its target, and the paper's or a peer's number.
+
+One function a part, from the JSON object that `python -m bench.<part>` prints to its rows. A row without a target says
+so; a target that is not met says MISSED.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from statistics import mean
+from typing import Any, NamedTuple
+
+NOT_REPORTED = "not reported"
+
+
+class Row(NamedTuple):
+    """One measured number. `target` None: no target is set, and `met` is None too."""
+
+    what: str
+    measured: str
+    target: str | None
+    met: bool | None
+    reference: str  # the paper's number, or the peer's
+
+    @property
+    def verdict(self) -> str:
+        return "" if self.met is None else verdict(self.met)
+
+    @property
+    def cells(self) -> tuple[str, str, str, str, str]:
+        """As printed, in the order of `HEADER`."""
+        return self.what, self.measured, self.target or "no target", self.verdict, self.reference
+
+
+HEADER = ("what", "measured", "target", "", "paper or peer")
+
+
+def verdict(met: bool) -> str:
+    return "met" if met else "MISSED"
+
+
+def at_most(what: str, measured: str, value: float, limit: float, unit: str = "",
+            reference: str = NOT_REPORTED) -> Row:
+    """A row whose value should not exceed a limit; both in `unit`."""
+    return Row(what, measured, f"≤ {limit:g} {unit}".rstrip(), value <= limit, reference)
+
+
+def at_least(what: str, measured: str, value: float, limit: float, unit: str = "",
+             reference: str = NOT_REPORTED) -> Row:
+    return Row(what, measured, f"≥ {limit:g} {unit}".rstrip(), value >= limit, reference)
+
+
+def without_target(what: str, measured: str, reference: str = NOT_REPORTED) -> Row:
+    return Row(what, measured, None, None, reference)
+
+
+def seconds(times: dict[str, float]) -> str:
+    return f"{times['wall']:.2f} s ({times['processor']:.2f} s of processor time)"
+
+
+def synthesis(found: dict[str, Any]) -> Iterable[Row]:
+    for search, limit in (("exact", 3.0), ("k-coherence", 1.0)):
+        for frame, label in (("first", "first frame"), ("next", "a later frame")):
+            times = found[f"{search}, {frame}"]
+            yield at_most(f"ma09 2-D, 64² to 256², {search} search: {label}", seconds(times), times["wall"], limit, "s",
+                          "60 s on a CPU, 3 to 5 s on a GeForce 8800 GTX")
+    peak, rest = found["peak memory MB"], found["of it Python, libraries and PoCL at rest MB"]
+    yield at_most("peak memory", f"{peak} MB ({rest} MB of it before any work)", peak, 500, "MB")
+    times = found["times faster than the reference"]
+    yield at_least("speed-up over NumPy and SciPy", f"{times:.1f} ×", times, 10, "×",
+                   f"NumPy and SciPy: {seconds(found['reference'])}")
+
+
+def search(found: dict[str, Any]) -> Iterable[Row]:
+    for dims, times in found.items():
+        yield at_most(f"exact search, 65,536 queries on 4,096 points, {dims}",
+                      f"{times['ours']:.3f} s, {times['ratio']:.2f} of FAISS's time", times["ratio"], 1.5,
+                      "of FAISS's time", f"FAISS flat index: {times['FAISS']:.3f} s")
+
+
+def density(found: dict[str, Any]) -> Iterable[Row]:
+    took, faster = found["seconds a frame"], found["times faster"]
+    yield at_most(found["what"], f"{took:.2f} s a frame", took, 1.5, "s")
+    yield at_least("speed-up over SciPy's map_coordinates", f"{faster:.1f} ×", faster, 6, "×",
+                   f"SciPy: {found['scipy, seconds a frame']:.2f} s a frame")
+    took, busy = found["plume"]["seconds a frame"], found["plume"]["processor seconds a frame"]
+    yield at_most(found["plume"]["what"], f"{took:.2f} s a frame ({busy:.2f} s of processor time)", took, 0.5, "s")
+
+
+def repeat(found: dict[str, Any]) -> Iterable[Row]:
+    different, runs = found["different results"], found["runs"]
+    yield at_most("same bits: 10 runs, 1 and 2 threads, cold and warm kernel cache",
+                  f"{different} different result{'s' if different > 1 else ''} in {runs} runs", different, 1)
+
+
+def solid(found: dict[str, Any]) -> Iterable[Row]:
+    for frame, label in (("first", "first frame"), ("next", "a later frame")):
+        times = found["256²×64"][frame]
+        yield at_most(f"ma09 3-D, 64² on three views to 256²×64, k-coherence: {label}", seconds(times), times["wall"],
+                      60, "s", "1 h on a CPU, 4 to 8 min on a GeForce 8800 GTX")
+    peak, growth = found["peak memory MB"], found["growth"]
+    yield at_most("peak memory", f"{peak} MB", peak, 4000, "MB")
+    (first, least), *_, (last, most) = growth["processor s"].items()
+    yield at_most(f"exponent of the time in the number of voxels, {first} to {last}",
+                  f"{growth['exponent']:.2f} ({least:g} to {most:g} s of processor time)", growth["exponent"], 1.05)
+
+
+def smoke(found: dict[str, Any]) -> Iterable[Row]:
+    march, draft, error = found["march"], found["draft"], "{:.1%} from a path trace of many samples"
+    yield at_most(f"{found['what']}, ray marched", seconds(march), march["wall"], 1.5, "s",
+                  f"error: {error.format(found['error of the march'])}")
+    yield at_most(f"path-traced draft of {found['draft, paths per pixel']} paths per pixel, denoised", seconds(draft),
+                  draft["wall"], 15, "s", f"error: {error.format(found['error of the draft'])}; "
+                                          f"{found['error of the draft, not denoised']:.1%} without denoising")
+    yield without_target("the studio without smoke, once per process", seconds(found["empty studio, once"]), "")
+    if "beside Cycles" in found:
+        ratio = found["beside Cycles"]["times as efficient as volpath"]
+        yield without_target("volpath's time over Cycles' at equal noise", f"{ratio:.2f}", "Blender's Cycles: 1")
+
+
+def quality(found: dict[str, Any]) -> Iterable[Row]:
+    met, every = sum(row["met"] for row in found["quality"]), len(found["quality"])
+    yield at_least("first frames with 85 to 115 % of the exemplar's rms, 45 % of its neighbourhoods used and 9 in 10 "
+                   "motifs whole", f"{met} of {every}", met, every)
+
+
+def boundary(found: dict[str, Any]) -> Iterable[Row]:
+    rows = found["texture at the boundary"]
+
+    def average(observed: str, key: str) -> float:
+        return mean(row[key] for row in rows if row["boundary"] == observed)
+
+    worst = max(row["wall, rms"] for row in rows if row["boundary"] == "observed")
+    yield at_most("ma09 figure 7: normal component of H at the wall, over its rms", f"{worst:.2%}", 100 * worst, 2, "%",
+                  f"boundary not observed: {average('not', 'wall, rms'):.0%}")
+    energy, without = (f"{average(o, 'forward'):.3f}, {average(o, 'backward'):.3f}" for o in ("observed", "not"))
+    yield without_target("its texture: forward, backward distance", energy, f"boundary not observed: {without}")
+    left = max(row["divergence"] for row in found["projection past a ball"])
+    yield at_most("divergence after projection past a ball, over the rms gradient", f"{left:.1e}", left, 1e-4)
+
+
+def potential(found: dict[str, Any]) -> Iterable[Row]:
+    rows = found["motion and potential"]
+    largest = {kind: max(row["divergence"] for row in rows if row["synthesized"] == kind)
+               for kind in ("motion", "potential")}
+    yield at_most("potential synthesized in 2-D: rms divergence over the rms gradient", f"{largest['potential']:.1e}",
+                  largest["potential"], 1e-4, reference=f"the motion synthesized: {largest['motion']:.2g}")
+
+
+def lagrangian(found: dict[str, Any]) -> Iterable[Row]:
+    change = {samples: mean(row["change in 4 frames"] for row in found["flicker"] if row["samples"] == samples)
+              for samples in ("grid", "lagrangian")}
+    yield Row("moving samples: change of the detail in 4 frames of a steady flow, over its rms",
+              f"{change['lagrangian']:.1%}", "≤ that on a grid", change["lagrangian"] <= change["grid"],
+              f"on a grid: {change['grid']:.1%}")
+
+
+def elements(found: dict[str, Any]) -> Iterable[Row]:
+    for (name, times), (limit, memory) in zip(found["cases"].items(), ((60, 2000), (300, None), (300, None)),
+                                              strict=True):
+        yield at_most(f"ma13, {name}, to convergence", f"{seconds(times)}, {times['iterations']} iterations",
+                      times["wall"], limit, "s")
+        peak, what = times["peak memory MB"], f"{name}: peak memory"
+        yield at_most(what, f"{peak} MB", peak, memory, "MB") if memory else without_target(what, f"{peak} MB")
+    exponent = found["growth"]["exponent"]
+    yield at_most("exponent of an iteration's time in the number of elements, 500 to 8,000", f"{exponent:.2f}",
+                  exponent, 1.1)
+    faster = found["times faster than the reference"]
+    yield at_least("exhaustive search, speed-up over NumPy and SciPy",
+                   f"{faster['wall']:.0f} × ({faster['processor']:.0f} × by processor time)", faster["wall"], 20, "×")
+    basic, smooth, weighted = found["jitter"].values()
+    yield at_most("squared jitter over that of the basic synthesis (§4.1), with motion weighted",
+                  f"{weighted / basic:.4f}", weighted / basic, 0.5,
+                  reference=f"as the paper says (§4.2): {smooth / basic:.2f}")
+    worst, where = max((row[key], f"{row['exemplar']}, {key}") for row in found["exemplars in their own domains"]
+                       for key in ("pair correlation", "motion spectrum", "nearest distance"))
+    yield at_most("an exemplar in its own domain, worst of three statistics", f"{worst:.1%} off ({where})", 100 * worst,
+                  10, "%")
+
+
+def fidelity(found: dict[str, Any]) -> Iterable[Row]:
+    rows = found["fidelity of scenes"]
+    for key in ("pair correlation", "motion spectrum", "nearest distance"):
+        worst, where = max((row[key], f"{row['scene']} {row['variant']}") for row in rows if row[key] is not None)
+        yield without_target(f"{key}, worst of all scenes", f"{worst:.1%} off ({where})", "the exemplar's own")
+
+
+ROWS: dict[str, Callable[[dict[str, Any]], Iterable[Row]]] = {
+    "synthesis": synthesis, "search": search, "density": density, "repeat": repeat, "solid": solid, "smoke": smoke,
+    "quality": quality, "boundary": boundary, "potential": potential, "lagrangian": lagrangian, "elements": elements,
+    "fidelity": fidelity}
