@@ -19,8 +19,11 @@ def rgb(colour: studio.Point) -> dict[str, Any]:
 
 
 def shape(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray | None,
-          bsdf: dict[str, Any], smooth: bool = True) -> Any:
-    """A mesh with a linear colour (N, 3) at each vertex, for VERTEX_COLOUR, and smooth or flat shading."""
+          bsdf: dict[str, Any], smooth: bool = True, vertex_normals: np.ndarray | None = None) -> Any:
+    """A mesh with a linear colour (N, 3) at each vertex, for VERTEX_COLOUR, and smooth or flat shading.
+
+    vertex_normals  (N, 3) for smooth shading; None: `normals`
+    """
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict(bsdf)
     made = mi.Mesh(name, len(vertices), len(faces), props=properties, has_vertex_normals=smooth)
@@ -32,7 +35,8 @@ def shape(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, colours: 
     parameters.update()
     if smooth:
         # Mitsuba adds up its own normals in any order: other bits in each run
-        parameters["vertex_normals"] = normals(vertices, faces).ravel()
+        given = normals(vertices, faces) if vertex_normals is None else vertex_normals
+        parameters["vertex_normals"] = np.ascontiguousarray(given, np.float32).ravel()
         parameters.update()
     return made
 
@@ -115,12 +119,11 @@ def rendered(mi: Any, scene: dict[str, Any], integrator: Any, shot: studio.Shot)
 
 
 def every_lamp(mi: Any, bounces: int, split: int = 1) -> Any:
-    """An integrator for rooms with few lamps: every lamp is asked at every place that a path meets.
+    """An integrator for scenes with few lamps: at every vertex of a path, every lamp is sampled.
 
-    bounces  how often light is sent on from surface to surface before the eye's; split: paths that go on from where
-             a ray of the eye ends
-    A path tracer draws lots between the lamps: more noise for the same rays. Light from everywhere (a constant
-    emitter) is met, not asked.
+    bounces  indirect bounces; split: paths that continue from the first surface a camera ray hits
+    A path tracer picks one lamp at random at each vertex: more noise for the same number of rays. Environment light
+    (a constant emitter) is found by BSDF sampling only.
     """
     dr = backend.drjit()
     context = mi.BSDFContext()
@@ -131,45 +134,45 @@ def every_lamp(mi: Any, bounces: int, split: int = 1) -> Any:
             light = first.emitter(scene, active).eval(first, active)
             hit = active & first.is_valid()
             bsdf = first.bsdf(ray)
-            light += self.asked(scene, sampler, first, bsdf, hit)
+            light += self.direct(scene, sampler, first, bsdf, hit)
             for _ in range(split):
-                light += self.sent_on(scene, sampler, first, bsdf, hit) / split
+                light += self.indirect(scene, sampler, first, bsdf, hit) / split
             return light, mi.Bool(True), []
 
-        def asked(self, scene: Any, sampler: Any, met: Any, bsdf: Any, active: Any) -> Any:
-            """The lamps' light that a surface sends back along the ray, but for the share that `sent_on` finds."""
+        def direct(self, scene: Any, sampler: Any, surface: Any, bsdf: Any, active: Any) -> Any:
+            """Light of the lamps reflected along the ray; `indirect` finds the other share of the MIS weights."""
             light = mi.Color3f(0)
             for emitter in scene.emitters():
                 if emitter.is_environment():
                     continue
-                way, seen = emitter.sample_direction(met, sampler.next_2d(active), active)
-                lit = active & (way.pdf > 0)
-                back, chance = bsdf.eval_pdf(context, met, met.to_local(way.d), lit)
-                lit &= ~scene.ray_test(met.spawn_ray_to(way.p), lit)
-                light += dr.select(lit, back * seen * self.own(way.pdf, chance), 0)
+                sample, incoming = emitter.sample_direction(surface, sampler.next_2d(active), active)
+                lit = active & (sample.pdf > 0)
+                reflected, pdf = bsdf.eval_pdf(context, surface, surface.to_local(sample.d), lit)
+                lit &= ~scene.ray_test(surface.spawn_ray_to(sample.p), lit)
+                light += dr.select(lit, reflected * incoming * self.balance(sample.pdf, pdf), 0)
             return light
 
-        def own(self, chance: Any, other: Any) -> Any:
-            """The share of two ways to find a lamp that the first has, by their densities [Veach and Guibas 1995]."""
-            share = chance / (chance + other)
-            return dr.select(dr.isfinite(share), share, 0)
+        def balance(self, pdf: Any, other: Any) -> Any:
+            """The balance heuristic: MIS weight of a sample by its two densities [Veach and Guibas 1995]."""
+            weight = pdf / (pdf + other)
+            return dr.select(dr.isfinite(weight), weight, 0)
 
-        def sent_on(self, scene: Any, sampler: Any, met: Any, bsdf: Any, active: Any) -> Any:
-            """The light that comes to a surface from others, and what its own lobes find of the lamps."""
-            light, share = mi.Color3f(0), mi.Color3f(1)
+        def indirect(self, scene: Any, sampler: Any, surface: Any, bsdf: Any, active: Any) -> Any:
+            """Light from other surfaces, and lamps hit by BSDF samples."""
+            light, throughput = mi.Color3f(0), mi.Color3f(1)
             for _ in range(bounces):
-                chosen, weight = bsdf.sample(context, met, sampler.next_1d(active), sampler.next_2d(active), active)
-                share = share * dr.select(active, weight, 0)
-                found = scene.ray_intersect(met.spawn_ray(met.to_world(chosen.wo)), active)
-                hit = active & found.is_valid()
-                emitter = found.emitter(scene, active)
-                asked = emitter.pdf_direction(met, mi.DirectionSample3f(scene, found, met), hit)
-                own = dr.select(hit, self.own(chosen.pdf, asked), 1)
-                light += dr.select(active, share * emitter.eval(found, active) * own, 0)
-                met, active = found, hit
-                bsdf = met.bsdf()
-                # a glint of a glint is a firefly: few paths find it, and each would be a spot
-                light += dr.minimum(share * self.asked(scene, sampler, met, bsdf, active), BRIGHTEST)
+                sample, weight = bsdf.sample(context, surface, sampler.next_1d(active), sampler.next_2d(active), active)
+                throughput = throughput * dr.select(active, weight, 0)
+                following = scene.ray_intersect(surface.spawn_ray(surface.to_world(sample.wo)), active)
+                hit = active & following.is_valid()
+                emitter = following.emitter(scene, active)
+                pdf = emitter.pdf_direction(surface, mi.DirectionSample3f(scene, following, surface), hit)
+                mis = dr.select(hit, self.balance(sample.pdf, pdf), 1)
+                light += dr.select(active, throughput * emitter.eval(following, active) * mis, 0)
+                surface, active = following, hit
+                bsdf = surface.bsdf()
+                # clamped: a highlight seen in a highlight is found by few paths and makes fireflies
+                light += dr.minimum(throughput * self.direct(scene, sampler, surface, bsdf, active), BRIGHTEST)
             return light
 
     return EveryLamp(mi.Properties())

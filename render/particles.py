@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from render import backend, lic, tonemap
+from render import backend, lic, mitsuba_shapes, tonemap
 from synth.noise import gradient_noise
 
 # the stones, in heights of the picture: how wide their shoulder is at most, and how high it rises over its width
@@ -49,26 +49,18 @@ def riverbed(distance: np.ndarray, width: int, spp: int, seed: int) -> np.ndarra
     mi = backend.mitsuba("scalar_rgb")
     aspect = distance.shape[1] / distance.shape[0]
     sun = np.array(KEY) / np.linalg.norm(KEY)
-    transform = mi.ScalarTransform4f
     loaded = mi.load_dict({
         "type": "scene",
         "integrator": {"type": "path", "max_depth": BOUNCES},
         "bed": _bed(mi, distance, height, seed),
-        "sky": {"type": "constant", "radiance": {"type": "rgb", "value": list(SKY_LIGHT)}},
+        "sky": mitsuba_shapes.sky(SKY_LIGHT),
         "sun": {
             "type": "rectangle",
-            "to_world": transform().look_at(origin=list(8 * sun + [0, 0.5, 0]), target=[0, 0.5, 0],
-                                            up=[0, 0, 1]).scale([1.1, 1.1, 1]),
+            "to_world": mi.ScalarTransform4f().look_at(
+                origin=list(8 * sun + [0, 0.5, 0]), target=[0, 0.5, 0], up=[0, 0, 1]).scale([1.1, 1.1, 1]),
             "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [13 * c for c in KEY_LIGHT]}},
         },
-        "sensor": {
-            "type": "orthographic", "near_clip": 0.1, "far_clip": 10.0,
-            "to_world": transform().look_at(origin=[0, 0.5, 5], target=[0, 0.5, 0], up=[0, 1, 0]).scale(
-                [0.5 * aspect, 0.5 * aspect, 1]),
-            "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
-                     "component_format": "float32", "rfilter": {"type": "box"}},
-            "sampler": {"type": "independent"},
-        },
+        "sensor": mitsuba_shapes.overhead(mi, 0.5, width, height, aspect, "independent"),
     })
     return np.array(mi.render(loaded, spp=spp, seed=seed), np.float32)
 
@@ -114,21 +106,12 @@ def _coloured(mi: Any, points: np.ndarray, colour: np.ndarray) -> Any:
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     faces = np.concatenate([np.stack([corner, corner + 1, corner + columns + 1], -1),
                             np.stack([corner, corner + columns + 1, corner + columns], -1)])
-    properties = mi.Properties()
-    properties["bsdf"] = mi.load_dict({
-        "type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "mesh_attribute",
-                                                                        "name": "vertex_colour"}}})
-    shape = mi.Mesh("bed", rows * columns, len(faces), has_vertex_normals=True, props=properties)
-    shape.add_attribute("vertex_colour", 3, np.ascontiguousarray(colour, np.float32).ravel())
-    parameters = mi.traverse(shape)
-    parameters["vertex_positions"] = np.ascontiguousarray(points, np.float32).ravel()
-    parameters["faces"] = np.ascontiguousarray(faces, np.uint32).ravel()
     dy, dx = np.gradient(points[..., 2], points[1, 0, 1] - points[0, 0, 1], points[0, 1, 0] - points[0, 0, 0])
     normal = np.stack([-dx, -dy, np.ones_like(dx)], -1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    parameters["vertex_normals"] = np.ascontiguousarray(normal, np.float32).ravel()
-    parameters.update()
-    return shape
+    diffuse = {"type": "diffuse", "reflectance": mitsuba_shapes.VERTEX_COLOUR}
+    return mitsuba_shapes.shape(mi, "bed", points.reshape(-1, 3), faces, colour, {"type": "twosided", "bsdf": diffuse},
+                                vertex_normals=normal)
 
 
 def shown(distance: np.ndarray, width: int) -> np.ndarray:

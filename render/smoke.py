@@ -1,9 +1,8 @@
-"""Smoke as a picture: a lit sheet, ink on paper, or a volume in a studio.
+"""Smoke as a lit slab, as ink on paper, or as a volume in a studio.
 
-`lit` and `ink` draw a 2-D density (Y, X); `volume` path-traces a 3-D one (Z, Y, X) with Mitsuba. All take y
-up (row 0 is the bottom), return linear Rec.709 light (h, w, 3) float32 with the top row first, and give the
-same bits each time. `render.tonemap` turns light into a picture: "filmic" for `lit` and `volume`, "straight"
-for `ink`.
+`lit` and `ink` draw a 2-D density (Y, X); `volume` path-traces a 3-D one (Z, Y, X) with Mitsuba. All take y up (row 0
+is the bottom), return linear Rec.709 light (h, w, 3) float32 with the top row first, and give the same bits each
+time. `render.tonemap` turns light into display values: "filmic" for `lit` and `volume`, "straight" for `ink`.
 """
 
 from __future__ import annotations
@@ -19,13 +18,13 @@ from scipy import ndimage
 
 from render import backend, denoise, lic, march, mitsuba_shapes, smoke_slab, studio
 
-# The lit sheet. Lengths are shares of the picture's height, so a scene looks the same at any width.
+# The lit slab. Lengths are shares of the picture's height, so that a scene looks the same at any width.
 THICKNESS = 0.075  # about the size of one motif
-OPTICAL_DEPTH = 7.0  # through the whole sheet where density and relief are 1
-DENSITY_POWER = 1.3  # above 1: thin smoke is thinner than linear, and edges read finer
+OPTICAL_DEPTH = 7.0  # through the slab where density and relief are 1
+DENSITY_POWER = 1.3  # above 1: thin smoke becomes thinner and edges look finer
 BODY = 0.035  # blur radius of the plume's body
-DETAIL = ((0.006, 0.2), (0.02, 0.3))  # of its detail, fine and coarse, and the relief each may add or take
-DETAIL_GAIN = 3.0  # of small differences of density
+DETAIL = ((0.006, 0.2), (0.02, 0.3))  # fine and coarse: blur radius, and the largest change of the relief
+DETAIL_GAIN = 3.0  # relief per small difference of density
 KEY = smoke_slab.Lamp(smoke_slab.directions(125.0, 12.0, 3), slope=2.2, density=1.6)  # from the upper left, in front
 RIM = smoke_slab.Lamp(smoke_slab.directions(30.0, 12.0, 2), slope=1.2, density=0.8, behind=True)  # from the right
 KEY_LIGHT = np.array([1.00, 0.92, 0.82], np.float32) * 1.36  # warm
@@ -41,21 +40,21 @@ INKS = {
     "black": (3.60, 3.52, 3.40),
 }
 PAPER = np.array([0.965, 0.952, 0.925], np.float32)
-PAPER_GRAIN = 0.012  # deviation of the paper's tone
+PAPER_GRAIN = 0.012  # standard deviation of the paper's brightness, relative
 
 # The volume.
 SMOKE_ALBEDO = (0.90, 0.905, 0.915)
 SMOKE_FORWARD = 0.2  # mean cosine of the scattering angle
-MAX_DEPTH = 32  # bounces; what is left after them is 3 % of the light
-MOST_DENSITY = 1e3  # delta tracking steps by the largest extinction: one cell of 1e8 takes for ever
+MAX_DEPTH = 32  # bounces; 3 % of the light is left after them
+MOST_DENSITY = 1e3  # steps of delta tracking are as short as the largest extinction asks: one cell of 1e8 never ends
 STUDIO_SPP = 128  # for each light of the empty studio: it must not be noisy
-BORDER_PATHS = 256  # for the light that comes to the smoke from each direction
-FARTHEST = 1e3  # stands for a ray that meets nothing
-MOST_SAMPLES = 2**30  # in one pass; Mitsuba's memory explodes above 2^32
+BORDER_PATHS = 256  # for the light that reaches the smoke from each direction
+FARTHEST = 1e3  # distance of a ray that hits nothing
+MOST_SAMPLES = 2**30  # in one pass; Mitsuba runs out of memory above 2^32
 
 
 def checked_density(density: np.ndarray, dimensions: int) -> np.ndarray:
-    """`density` as float32; ValueError unless it has so many dimensions and is finite and not negative."""
+    """`density` as float32; ValueError unless it has that many dimensions and is finite and not negative."""
     density = np.asarray(density, np.float32)
     if density.ndim != dimensions or min(density.shape) < 2:
         axes = "(Y, X)" if dimensions == 2 else "(Z, Y, X)"
@@ -68,21 +67,21 @@ def checked_density(density: np.ndarray, dimensions: int) -> np.ndarray:
 
 
 def _blurred(values: np.ndarray, sigma: float) -> np.ndarray:
-    """`values` (Y, X) under a Gaussian of `sigma` pixels; a wide one on averages of pixels, which it cannot tell."""
+    """`values` (Y, X) under a Gaussian of `sigma` pixels; a wide one works on block averages, with the same result."""
     factor = max(1, int(sigma / 5))
     rows, columns = (-n % factor for n in values.shape)
     averages = lic.averaged(np.pad(values, ((0, rows), (0, columns)), mode="edge"), factor)
-    # averaging has blurred by (factor^2 - 1) / 12 already
+    # averaging has already blurred with a variance of (factor^2 - 1) / 12
     soft = ndimage.gaussian_filter(averages, np.sqrt(sigma**2 - (factor**2 - 1) / 12) / factor, truncate=2.5)
     height, width = values.shape
     return lic.resampled(soft, height + rows, width + columns, order=3)[:height, :width] if factor > 1 else soft
 
 
 def _relief(rho: np.ndarray) -> np.ndarray:
-    """Half thickness (Y, X) of the sheet, 1 = full: a rounded body that carries the detail of the density.
+    """Half thickness (Y, X) of the slab, 1 = full: a rounded body plus the detail of the density.
 
-    The body gives the plume its roundness; the detail turns the small differences of density inside it, which
-    an opaque sheet would hide, into slopes that catch the light.
+    The body makes the plume look round; the detail turns small differences of density, which opaque smoke would
+    hide, into slopes that catch the light.
     """
     def blurred(radius: float) -> np.ndarray:
         return _blurred(rho, radius * rho.shape[0])
@@ -94,7 +93,7 @@ def _relief(rho: np.ndarray) -> np.ndarray:
 
 def _in_plane(rho: np.ndarray, towards: Iterable[tuple[float, float]], density: float,
               least: float) -> np.ndarray:
-    """Share (Y, X) of a light left after the smoke's whole width: the large shadow of the plume on itself."""
+    """Transmittance (Y, X) through the smoke in the slab's plane, at least `least`: the plume's shadow on itself."""
     sigma = rho * np.float32(density / rho.shape[0])
     shares = np.stack([np.exp(-smoke_slab.depth_towards(sigma, d)) for d in towards])
     return np.asarray(least + (1.0 - least) * shares.mean(axis=0))
@@ -104,24 +103,24 @@ def _in_plane(rho: np.ndarray, towards: Iterable[tuple[float, float]], density: 
 def _backdrop(height: int, width: int) -> np.ndarray:
     """A pool of light (height, width, 3) on a dark wall, behind the middle of the picture."""
     y, x = np.mgrid[0:height, 0:width].astype(np.float32) / height
-    away = np.hypot((x - 0.5 * width / height) / 0.75, (y - 0.5) / 0.85)
-    pool = np.exp(-2.2 * away**2)[..., None]
+    radius = np.hypot((x - 0.5 * width / height) / 0.75, (y - 0.5) / 0.85)
+    pool = np.exp(-2.2 * radius**2)[..., None]
     return BACKDROP_EDGE + (BACKDROP_CENTRE - BACKDROP_EDGE) * pool
 
 
 def lit(density: np.ndarray, width: int) -> np.ndarray:
-    """A sheet of smoke (Y, X), shadowing itself, before a dark backdrop: linear light (h, width, 3).
+    """A slab of smoke (Y, X) with self-shadowing before a dark backdrop: linear light (h, width, 3).
 
-    The sheet has a thickness and is drawn in layers. A warm key shines slantwise through it from the front
-    left, a cool rim from behind on the right, a dim sky from the front; each is also dimmed by the smoke that
-    lies between in the sheet's own plane. The smoke's shadow falls on the backdrop.
+    The slab has a thickness and is drawn in layers. A warm key light comes from the front left, a cool rim light from
+    behind on the right, a dim sky from the front; the smoke in the slab's plane dims each of them as well. The smoke
+    casts a shadow on the backdrop.
     """
     density = checked_density(density, 2)
     height = lic.height_for(density.shape, width)
     rho = lic.resampled(density, height, width)  # linear: cubic leaves dark halos
     layer = THICKNESS * height / smoke_slab.LAYERS
     seen = smoke_slab.light(OPTICAL_DEPTH * rho**np.float32(DENSITY_POWER), _relief(rho), layer, (KEY, RIM),
-                       cone=round(0.006 * height))
+                            cone=round(0.006 * height))
     key = seen.lamps[0] * _in_plane(rho, smoke_slab.directions(125.0, 20.0, 3), 6.0, 0.12)
     rim = seen.lamps[1] * _in_plane(rho, smoke_slab.directions(30.0, 20.0, 3), 9.0, 0.05)
     sky = seen.sky * _in_plane(rho, smoke_slab.directions(90.0, 60.0, 3), 2.0, 0.3)
@@ -152,11 +151,14 @@ def ink(density: np.ndarray, width: int, colour: str = "indigo", seed: int = 1) 
 
 @dataclass(frozen=True)
 class VolumeSettings:
-    """How `volume` looks at a density. Lengths in world units.
+    """How `volume` renders a density; lengths in world units.
 
-    extinction: per world unit at density 1; spp: paths per pixel; bowl: (radius, height) of the bowl that the
-    plume rises from, None for none; method: "path", by Mitsuba's volpath, or "march" (`render.march`), which has
-    no noise; denoised: fit the paths to guides without noise (`render.denoise`).
+    width, height  of the picture, pixels
+    spp, seed      paths per pixel, and the seed of the sampler
+    extinction     per world unit at density 1
+    bowl           (radius, height) of the bowl that the plume rises from; None: no bowl
+    method         "path": Mitsuba's volpath; "march": `render.march`, without noise
+    denoised       of "path": whether `render.denoise` is applied
     """
 
     width: int = 512
@@ -171,7 +173,7 @@ class VolumeSettings:
 
 
 def active_box(density: np.ndarray) -> tuple[slice, slice, slice]:
-    """The smallest box (z, y, x slices) of all smoke, and one empty cell round it where the grid has one."""
+    """The smallest box (z, y, x slices) around all smoke, one empty cell wider on each side where the grid allows."""
     occupied = density > 0.0
     box = []
     for axis in range(3):
@@ -184,8 +186,8 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
            settings: VolumeSettings = VolumeSettings()) -> np.ndarray:
     """A picture (height, width, 3) of a density (Z, Y, X) in the studio, linear light.
 
-    voxel_size, origin: of the grid in world units, origin at the centre of cell (0, 0, 0), order x, y, z.
-    Raises ValueError for what Mitsuba would answer with a black picture, a hang or exhausted memory.
+    voxel_size, origin: of the grid in world units; origin (x, y, z) is the centre of cell (0, 0, 0)
+    Raises ValueError where Mitsuba would give a black picture, never end or run out of memory.
     """
     density = checked_density(density, 3)
     if density.max() > MOST_DENSITY:
@@ -206,7 +208,7 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
 
 def marched(density: np.ndarray, voxel_size: float, origin: tuple[float, float, float], settings: VolumeSettings,
             empty: march.EmptyStudio) -> march.Seen:
-    """What the march sees of a density (Z, Y, X), as of `volume`."""
+    """A density (Z, Y, X) as of `volume`, ray-marched."""
     box = active_box(density) if density.any() else (slice(0, 2),) * 3
     corner = np.array(origin) + voxel_size * np.array([side.start for side in box[::-1]])
     grid = march.Grid(density[box] * np.float32(settings.extinction * voxel_size), voxel_size, corner)
@@ -216,14 +218,14 @@ def marched(density: np.ndarray, voxel_size: float, origin: tuple[float, float, 
 
 
 def empty_studio(settings: VolumeSettings) -> march.EmptyStudio:
-    """The studio without smoke as `settings` see it, each light for itself; kept for all frames of an animation."""
+    """The studio of `settings` without smoke, one layer per light; cached for all frames of an animation."""
     return _empty_studio(dataclasses.replace(settings, spp=STUDIO_SPP, seed=1, extinction=1.0, method="path",
                                             denoised=False))
 
 
 def alone(density: np.ndarray, voxel_size: float, origin: tuple[float, float, float],
           settings: VolumeSettings) -> np.ndarray:
-    """A density (Z, Y, X) under the lights of the studio, path-traced, with nothing else there; as of `volume`."""
+    """A density (Z, Y, X) as of `volume`, path-traced under the lights of the studio without backdrop and bowl."""
     mi = backend.mitsuba("scalar_rgb")
     scene = _studio(mi, None)
     del scene["backdrop"]
@@ -235,13 +237,13 @@ def alone(density: np.ndarray, voxel_size: float, origin: tuple[float, float, fl
 def _empty_studio(settings: VolumeSettings) -> march.EmptyStudio:
     mi = backend.mitsuba("scalar_rgb")
     loaded = mi.load_dict({"type": "scene"} | _studio(mi, settings.bowl))
-    # four rays per pixel: edges are as smooth as the picture's
+    # four rays per pixel: edges as smooth as the picture's
     rays = settings.camera.rays(2 * settings.width, 2 * settings.height)
     unit = rays.reshape(-1, 3) / np.linalg.norm(rays.reshape(-1, 3), axis=1, keepdims=True)
     start = mi.Point3f(list(settings.camera.position))
-    met = [loaded.ray_intersect(mi.Ray3f(start, mi.Vector3f(list(ray)))) for ray in unit]
-    distance = lic.averaged(np.minimum([m.t for m in met], FARTHEST).reshape(rays.shape[:2]), 2)
-    bowl = [list(m.sh_frame.n) if m.is_valid() and m.shape.id() == "bowl" else [0.0] * 3 for m in met]
+    hits = [loaded.ray_intersect(mi.Ray3f(start, mi.Vector3f(list(ray)))) for ray in unit]
+    distance = lic.averaged(np.minimum([hit.t for hit in hits], FARTHEST).reshape(rays.shape[:2]), 2)
+    bowl = [list(hit.sh_frame.n) if hit.is_valid() and hit.shape.id() == "bowl" else [0.0] * 3 for hit in hits]
     normals = lic.averaged(np.array(bowl).reshape(rays.shape), 2)
     layers = [denoise.quiet_studio(_photographed(mi, _studio(mi, settings.bowl, [name]), settings), distance, normals)
               for name in (*studio.LAMPS, "sky")]
@@ -250,8 +252,8 @@ def _empty_studio(settings: VolumeSettings) -> march.EmptyStudio:
 
 
 def _border(mi: Any) -> np.ndarray:
-    """The light (6, 4, 3) that comes to the middle of the studio from each of `march.directions`, but for the lamps'
-    own."""
+    """The light (6, 4, 3) that reaches the middle of the studio from each of `march.directions`, without what comes
+    straight from the lamps."""
     light = np.zeros((6, 4, 3), np.float64)
     random = np.random.Generator(np.random.Philox(key=1))
     middle = mi.Point3f(0.0, 0.5, 0.0)
@@ -269,20 +271,12 @@ def _border(mi: Any) -> np.ndarray:
 
 
 def _photographed(mi: Any, scene: dict[str, Any], settings: VolumeSettings) -> np.ndarray:
-    """Renders `scene` in passes of at most MOST_SAMPLES samples; their mean (height, width, 3) float32."""
-    camera = settings.camera
+    """The picture (height, width, 3) float32 of `scene`, the mean of passes of at most MOST_SAMPLES samples."""
     scene = scene | {
         "type": "scene",
-        # roulette would run at every null collision and make fireflies: off, up to the last bounce
+        # Russian roulette would act at every null collision and make fireflies: off, up to the last bounce
         "integrator": {"type": "volpath", "max_depth": MAX_DEPTH, "rr_depth": MAX_DEPTH},
-        "sensor": {
-            "type": "perspective", "fov": camera.fov, "fov_axis": "y",
-            "to_world": mi.ScalarTransform4f().look_at(
-                origin=list(camera.position), target=list(camera.target), up=[0, 1, 0]),
-            "film": {"type": "hdrfilm", "width": settings.width, "height": settings.height,
-                     "pixel_format": "rgb", "component_format": "float32", "rfilter": {"type": "box"}},
-            "sampler": {"type": "independent"},
-        },
+        "sensor": mitsuba_shapes.sensor(mi, settings.camera, settings.width, settings.height, "independent"),
     }
     loaded = mi.load_dict(scene)
     most = max(1, MOST_SAMPLES // (settings.width * settings.height))
@@ -296,7 +290,7 @@ def _photographed(mi: Any, scene: dict[str, Any], settings: VolumeSettings) -> n
 
 def _medium(mi: Any, density: np.ndarray, voxel_size: float, origin: tuple[float, float, float],
             extinction: float) -> dict[str, Any]:
-    """The smoke as a Mitsuba shape: a box without a surface, cropped to the cells that hold any smoke."""
+    """The smoke as a Mitsuba shape: a box without a surface, cropped to `active_box`."""
     box = active_box(density)
     cells = np.array([s.stop - s.start for s in box[::-1]], np.float64)  # x, y, z
     low = np.array(origin) + (np.array([s.start for s in box[::-1]]) - 0.5) * voxel_size
@@ -312,36 +306,22 @@ def _medium(mi: Any, density: np.ndarray, voxel_size: float, origin: tuple[float
             "sigma_t": {"type": "gridvolume", "grid": grid, "raw": True,
                         "to_world": transform().translate(list(low)).scale(list(size))},
             "scale": extinction,
-            "albedo": {"type": "rgb", "value": list(SMOKE_ALBEDO)},
+            "albedo": mitsuba_shapes.rgb(SMOKE_ALBEDO),
             "phase": {"type": "hg", "g": SMOKE_FORWARD},
         },
     }
 
 
-def _mesh(mi: Any, name: str, mesh: studio.Mesh, colour: studio.Point) -> Any:
-    """A diffuse Mitsuba shape of a studio mesh, both sides alike."""
-    paint = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(colour)}}
-    properties = mi.Properties()
-    properties["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": paint})
-    shape = mi.Mesh(name, len(mesh.vertices), len(mesh.faces), props=properties)
-    parameters = mi.traverse(shape)
-    parameters["vertex_positions"] = np.ascontiguousarray(mesh.vertices, np.float32).ravel()
-    parameters["faces"] = np.ascontiguousarray(mesh.faces, np.uint32).ravel()
-    parameters.update()
-    return shape
-
-
 def _studio(mi: Any, bowl: tuple[float, float] | None,
             lights: Sequence[str] = (*studio.LAMPS, "sky")) -> dict[str, Any]:
-    """Backdrop and bowl, and lights; `sampling_weight` sends most shadow rays to key and rim."""
-    scene: dict[str, Any] = {"backdrop": _mesh(mi, "backdrop", studio.backdrop(), studio.BACKDROP_COLOUR)}
+    """Backdrop, bowl and lights; `sampling_weight` sends most shadow rays to key and rim."""
+    def flat(name: str, mesh: studio.Mesh, colour: studio.Point) -> Any:
+        return mitsuba_shapes.plain(mi, name, mesh, mitsuba_shapes.matte(colour), smooth=False)
+
+    scene: dict[str, Any] = {"backdrop": flat("backdrop", studio.backdrop(), studio.BACKDROP_COLOUR)}
     if "sky" in lights:
-        scene["sky"] = {"type": "constant", "radiance": {"type": "rgb", "value": list(studio.SKY)},
-                        "sampling_weight": studio.SKY_SHARE}
-    for name, box in studio.LAMPS.items():
-        if name not in lights:
-            continue
-        scene[name] = mitsuba_shapes.lamp(mi, box)
+        scene["sky"] = mitsuba_shapes.sky(studio.SKY) | {"sampling_weight": studio.SKY_SHARE}
+    scene |= {name: mitsuba_shapes.lamp(mi, box) for name, box in studio.LAMPS.items() if name in lights}
     if bowl:
-        scene["bowl"] = _mesh(mi, "bowl", studio.bowl(*bowl), studio.BOWL_COLOUR)
+        scene["bowl"] = flat("bowl", studio.bowl(*bowl), studio.BOWL_COLOUR)
     return scene

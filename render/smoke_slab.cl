@@ -1,19 +1,19 @@
-/* Light through a sheet of smoke in layers: see sheet.py, whose NumPy functions these kernels must equal.
-   Sizes: WIDTH x HEIGHT pixels, x fastest, y up; rows are PITCH apart, a multiple of 16 that is not a power of
-   two, and LAYERS layers LAYER apart: else rows and layers push each other out of the processor's cache. */
+/* Light through a slab of smoke in layers: see smoke_slab.py, whose NumPy functions these kernels must equal.
+   Sizes: WIDTH x HEIGHT pixels, x fastest, y up. The stride of rows is PITCH, a multiple of 16 that is not a power of
+   two, and that of the LAYERS layers is LAYER: otherwise rows and layers evict each other from the cache. */
 
 #define HERE (y * PITCH + x)
 #define LAYER (HEIGHT * PITCH)
 
-/* Optical depth of each layer, front first, and the weight with which the eye sees it; 16 pixels at a time. */
+/* Optical depth of each layer, front first, and its weight for the eye; 16 pixels at a time. */
 kernel void split(global const float *depth, global const float *relief, global float *layers, global float *seen,
                   global float *passed) {
     const int x = get_global_id(0) * 16, y = get_global_id(1);
-    const float16 half_thickness = vload16(0, relief + HERE), whole = vload16(0, depth + HERE);
+    const float16 half_thickness = vload16(0, relief + HERE), total = vload16(0, depth + HERE);
     float16 before = (float16)(1.0f), sum = (float16)(0.0f);
     for (int k = 0; k < LAYERS; k++) {
         const float z = fabs(2.0f * (k + 0.5f) / LAYERS - 1.0f);
-        const float16 layer = whole / LAYERS * clamp((half_thickness - z) * (LAYERS / SOFT_LAYERS) + 0.5f,
+        const float16 layer = total / LAYERS * clamp((half_thickness - z) * (LAYERS / SOFT_LAYERS) + 0.5f,
                                                      (float16)(0.0f), (float16)(1.0f));
         sum += layer;
         const float16 after = exp(-sum);
@@ -26,8 +26,8 @@ kernel void split(global const float *depth, global const float *relief, global 
 
 #define INSIDE ((y + PAD) * (WIDTH + 2 * PAD) + x + PAD)
 
-/* One layer of a slanted light: what the layer before let through, read at an offset of (ix + fx, iy + fy), is
-   seen and dimmed. first, deep: light before and after this layer, with a border of PAD pixels of full light. */
+/* One layer of a slanted light: the light that passed the layer before, read at an offset of (ix + fx, iy + fy), is
+   added to the picture and attenuated. first, deep: before and after, with a border of PAD pixels of full light. */
 kernel void traverse(global const float *layers, global const float *seen, global const float *first_in,
                      global const float *deep_in, global float *first_out, global float *deep_out,
                      global float *total, const int k, const int ix, const int iy, const float fx, const float fy,
@@ -47,7 +47,7 @@ kernel void traverse(global const float *layers, global const float *seen, globa
     deep_out[INSIDE] = deep * half_deep * half_deep;
 }
 
-/* One layer of the sky: seen and dimmed ... */
+/* One layer of the sky: added to the picture and attenuated ... */
 kernel void sink(global const float *layers, global const float *seen, global float *light, global float *total,
                  const int k) {
     const int x = get_global_id(0), y = get_global_id(1);
@@ -58,7 +58,7 @@ kernel void sink(global const float *layers, global const float *seen, global fl
     light[HERE] *= exp(-0.7f * layer);
 }
 
-/* ... then averaged along x, 16 pixels at a time where the border is out of reach ... */
+/* ... then averaged along x, 16 pixels at a time where the window is inside the picture ... */
 kernel void spread_x(global const float *light, global float *across) {
     const int x = get_global_id(0) * 16, y = get_global_id(1);
     if (x >= CONE && x + 15 + CONE < WIDTH) {

@@ -1,8 +1,8 @@
-"""Light through a sheet of smoke that has a thickness: layers, slanted lights, a sky; kernels in sheet.cl.
+"""Light through a slab of smoke: layers, slanted lights, a sky; kernels in smoke_slab.cl.
 
-The NumPy functions are the specification; `light` runs the kernels and must equal `light_reference`. A sheet
-is given by two pictures (Y, X) float32: `depth`, its optical depth where it is 2 thick, and `relief`, half
-its thickness. y is up, layers are counted from the front.
+The NumPy functions are the specification; `light` runs the kernels and must equal `light_reference`. A slab is given
+by two arrays (Y, X) float32: `depth`, its optical depth where its thickness is 2, and `relief`, half its thickness.
+y is up, layers are counted from the front.
 """
 
 from __future__ import annotations
@@ -18,18 +18,20 @@ from synth import opencl
 from synth.advect import ROW
 
 LAYERS = 20
-SOFT_LAYERS = 2.5  # over which the faces of the sheet fade, so that they show no steps
-# Scattered again and again, light reaches deeper than one exponential says (Wrenninge 2013): this share of it
-# dies by the full extinction, this by a quarter.
+SOFT_LAYERS = 2.5  # layers over which the faces of the slab fade, so that no steps are visible
+# Multiple scattering carries light deeper than one exponential (Wrenninge 2013): one share is attenuated with the
+# full extinction, the other with a quarter of it.
 FIRST, DEEP = 0.6, 0.4
 
 
 @dataclass(frozen=True)
 class Lamp:
-    """A distant light that shines through the sheet aslant.
+    """A distant light that passes through the slab at an angle.
 
-    towards: unit vectors (x, y) in the plane to it, several for a soft shadow; slope: pixels across per pixel
-    of depth; density: factor on the smoke's optical depth; behind: whether it shines from the back.
+    towards  unit vectors (x, y) in the plane of the slab towards the light, several for a soft shadow
+    slope    pixels in the plane per pixel of depth
+    density  factor on the smoke's optical depth
+    behind   whether it shines from the back
     """
 
     towards: tuple[tuple[float, float], ...]
@@ -40,7 +42,7 @@ class Lamp:
 
 @dataclass(frozen=True)
 class Seen:
-    """What the eye sees (Y, X): the share of light that passes the sheet, each lamp's light, the sky's."""
+    """What the eye sees (Y, X): transmittance of the slab, the light of each lamp, the light of the sky."""
 
     passed: np.ndarray
     lamps: tuple[np.ndarray, ...]
@@ -48,7 +50,7 @@ class Seen:
 
 
 def directions(angle: float, spread: float, count: int) -> tuple[tuple[float, float], ...]:
-    """`count` unit vectors (x, y) round `angle`, `spread` each way; degrees, counter-clockwise from +x."""
+    """`count` unit vectors (x, y) from `angle` - `spread` to `angle` + `spread`, degrees counter-clockwise from +x."""
     angles = np.deg2rad(np.linspace(angle - spread, angle + spread, count))
     return tuple((float(np.cos(a)), float(np.sin(a))) for a in angles)
 
@@ -56,8 +58,9 @@ def directions(angle: float, spread: float, count: int) -> tuple[tuple[float, fl
 def depth_towards(sigma: np.ndarray, towards: tuple[float, float]) -> np.ndarray:
     """Optical depth (Y, X) from each cell to the border along the unit vector `towards` = (x, y).
 
-    sigma: (Y, X) float32, extinction per cell. One sweep over the rows (or columns), away from the light; the
-    linear interpolation between rows softens the shadow with distance, as a large light does.
+    sigma: (Y, X) float32, extinction per cell
+    One sweep over the rows (or columns), away from the light; linear interpolation between rows makes shadows softer
+    with distance, as those of a large light.
     """
     if abs(towards[0]) > abs(towards[1]):
         return depth_towards(sigma.T, (towards[1], towards[0])).T
@@ -76,7 +79,7 @@ def depth_towards(sigma: np.ndarray, towards: tuple[float, float]) -> np.ndarray
 
 
 def moved(values: np.ndarray, dx: float, dy: float, outside: float) -> np.ndarray:
-    """`values` (Y, X) read at (x + dx, y + dy), linear, `outside` beyond the border."""
+    """`values` (Y, X) at (x + dx, y + dy): linear interpolation, `outside` beyond the border."""
     (ix, fx), (iy, fy) = _split(dx), _split(dy)
     rim = max(abs(ix), abs(iy)) + 2
     (h, w), padded = values.shape, np.pad(values, rim, constant_values=outside)
@@ -86,9 +89,9 @@ def moved(values: np.ndarray, dx: float, dy: float, outside: float) -> np.ndarra
 
 
 def _split(offset: float) -> tuple[int, np.float32]:
-    """Whole pixels and the share of the next one."""
-    whole = int(np.floor(offset))
-    return whole, np.float32(offset - whole)
+    """Integer and fractional part."""
+    pixels = int(np.floor(offset))
+    return pixels, np.float32(offset - pixels)
 
 
 def _steps(lamp: Lamp, layer: float) -> tuple[list[tuple[float, float]], np.float32]:
@@ -98,7 +101,7 @@ def _steps(lamp: Lamp, layer: float) -> tuple[list[tuple[float, float]], np.floa
 
 
 def split_reference(depth: np.ndarray, relief: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Optical depth of each layer and the weight with which the eye sees it, (LAYERS, Y, X); what passes all."""
+    """Optical depth of each layer and its weight for the eye, (LAYERS, Y, X) each; transmittance of all (Y, X)."""
     z = np.abs(2.0 * (np.arange(LAYERS, dtype=np.float32) + 0.5) / LAYERS - 1.0)[:, None, None]
     layers = depth / LAYERS * np.clip((relief - z) * (LAYERS / SOFT_LAYERS) + 0.5, 0.0, 1.0)
     after = np.exp(-np.cumsum(layers, axis=0))
@@ -130,10 +133,11 @@ def light_reference(depth: np.ndarray, relief: np.ndarray, layer: float, lamps: 
 
 
 def light(depth: np.ndarray, relief: np.ndarray, layer: float, lamps: tuple[Lamp, ...], cone: int) -> Seen:
-    """What the eye sees of a sheet under lamps and a sky of 1.
+    """What the eye sees of a slab under lamps and a sky of radiance 1.
 
-    depth, relief: (Y, X) float32; layer: pixels from one layer to the next; cone: pixels by which the light of
-    the sky spreads each way from layer to layer.
+    depth, relief  (Y, X) float32
+    layer          pixels from one layer to the next
+    cone           pixels by which the light of the sky spreads on each side from layer to layer
     """
     height, width = depth.shape
     pad = 2 + int(layer * max((lamp.slope for lamp in lamps), default=0.0))

@@ -33,13 +33,23 @@ class Camera:
     target: Point = (0.0, 0.475, 0.0)
     fov: float = 11.4
 
-    def rays(self, width: int, height: int) -> np.ndarray:
-        """Directions (height, width, 3), not unit vectors, through the middles of the pixels, top row first."""
+    @property
+    def distance(self) -> float:
+        """From the position to the target, world units."""
+        return float(np.linalg.norm(np.array(self.target) - np.array(self.position)))
+
+    @property
+    def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Unit vectors (3,) to the right, upwards and ahead."""
         ahead = np.array(self.target) - np.array(self.position)
         ahead /= np.linalg.norm(ahead)
         right = np.cross(ahead, [0.0, 1.0, 0.0])
         right /= np.linalg.norm(right)
-        up = np.cross(right, ahead)
+        return right, np.cross(right, ahead), ahead
+
+    def rays(self, width: int, height: int) -> np.ndarray:
+        """Directions (height, width, 3), not unit vectors, through the centres of the pixels, top row first."""
+        right, up, ahead = self.axes
         half = np.tan(np.radians(self.fov) / 2)
         y = half * (1.0 - 2.0 * (np.arange(height) + 0.5) / height)
         x = half * (2.0 * (np.arange(width) + 0.5) / width - 1.0) * (width / height)
@@ -107,34 +117,29 @@ BOWL_COLOUR: Point = (0.085, 0.075, 0.070)
 def raised(elevation: float) -> Camera:
     """The camera lifted to `elevation` degrees above the horizon of its target, as far away as before."""
     x, y, z = CAMERA.target
-    away = float(np.linalg.norm(np.array(CAMERA.position) - np.array(CAMERA.target)))
     angle = float(np.radians(elevation))
-    return Camera((x, y + away * float(np.sin(angle)), z + away * float(np.cos(angle))), CAMERA.target, CAMERA.fov)
+    position = (x, y + CAMERA.distance * float(np.sin(angle)), z + CAMERA.distance * float(np.cos(angle)))
+    return Camera(position, CAMERA.target, CAMERA.fov)
 
 
 def framing(low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) -> Camera:
     """The camera moved, looking the same way through the same lens, until a box from `low` to `high` (3,) just fills
     the middle of a picture of `aspect`, its width over its height."""
     low, high = np.asarray(low, float), np.asarray(high, float)
-    ahead = np.array(camera.target) - np.array(camera.position)
-    ahead /= np.linalg.norm(ahead)
-    right = np.cross(ahead, [0.0, 1.0, 0.0])
-    right /= np.linalg.norm(right)
-    up = np.cross(right, ahead)
+    right, up, ahead = camera.axes
     corners = 0.5 * (high - low) * (np.indices((2, 2, 2)).reshape(3, -1).T * 2 - 1)
     half = FILLED * np.tan(np.radians(camera.fov) / 2)
-    away = float((np.maximum(np.abs(corners @ right) / aspect, np.abs(corners @ up)) / half - corners @ ahead).max())
+    distance = (np.maximum(np.abs(corners @ right) / aspect, np.abs(corners @ up)) / half - corners @ ahead).max()
     middle = (low + high) / 2
-    x, y, z = (float(c) for c in middle - away * ahead)
+    x, y, z = (float(c) for c in middle - float(distance) * ahead)
     return Camera((x, y, z), (float(middle[0]), float(middle[1]), float(middle[2])), camera.fov)
 
 
 def in_studio(vertices: np.ndarray, camera: Camera, usual: Camera) -> tuple[np.ndarray, Camera, float]:
     """Vertices (N, 3) and camera scaled until the camera sees as much as the `usual` one, and moved until what it looks
     at is over x = z = 0; and the scale. So lamps and backdrop suit subjects of any size; the floor stays at y = 0."""
-    seen = [float(np.linalg.norm(np.array(c.position) - np.array(c.target)) * np.tan(np.radians(c.fov) / 2))
-            for c in (camera, usual)]
-    scale = seen[1] / seen[0]
+    extent, usual_extent = (c.distance * float(np.tan(np.radians(c.fov) / 2)) for c in (camera, usual))
+    scale = usual_extent / extent
     shift = np.array([camera.target[0], 0.0, camera.target[2]])
     x, y, z = (float(c) for c in (np.array(camera.position) - shift) * scale)
     moved = Camera((x, y, z), (0.0, camera.target[1] * scale, 0.0), camera.fov)
@@ -149,12 +154,11 @@ def placed(vertices: np.ndarray, low: np.ndarray, high: np.ndarray, camera: Came
     """
     low, high = np.asarray(low, float), np.asarray(high, float)
     ahead = np.array(camera.target) - np.array(camera.position)
-    away = float(np.linalg.norm(ahead))
-    right = np.cross(ahead, [0.0, 1.0, 0.0])
+    right = np.cross(ahead, [0.0, 1.0, 0.0])  # of the vector itself: `axes` rounds its last bit elsewhere
     right /= np.linalg.norm(right)
-    up = np.cross(right, ahead / away)
-    view = 2 * away * np.tan(np.radians(camera.fov) / 2)
-    # the widest and the highest that the box looks
+    up = np.cross(right, ahead / camera.distance)
+    view = 2 * camera.distance * np.tan(np.radians(camera.fov) / 2)
+    # width and height of the box as the camera sees them
     wide, tall = (float(np.abs(axis) @ (high - low)) for axis in (right, up))
     scale = FILLED * view / max(wide / aspect, tall, 1e-9)
     return ((vertices - (low + high) / 2) * scale + np.array(camera.target)).astype(np.float32)

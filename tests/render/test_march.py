@@ -56,8 +56,8 @@ def test_white_furnace(shape: tuple[int, int, int]) -> None:
     made = march.source(grid, [], EYE, Medium((1.0, 1.0, 1.0), 0.2), np.ones((6, 4, 3)))
     assert made.get() == pytest.approx(sources(grid.sigma, 1.0), abs=1e-6)
     rays = through_all(grid, 40)
-    looked = march.look(made, shape, rays, grid.cells(EYE))
-    assert looked[:, :3] + looked[:, 3:] == pytest.approx(1.0, abs=1e-5)
+    marched = march.radiance(made, shape, rays, grid.cells(EYE))
+    assert marched[:, :3] + marched[:, 3:] == pytest.approx(1.0, abs=1e-5)
 
 
 def test_smoke_that_absorbs_is_never_brighter_than_the_furnace() -> None:
@@ -71,9 +71,10 @@ def test_smoke_that_absorbs_is_never_brighter_than_the_furnace() -> None:
 def through_all(grid: Grid, count: int) -> np.ndarray:
     """Rays (count, 4) from EYE towards random points of a grid, some ending there, some going on."""
     points = grid.cells(grid.origin) + random(count, 3, seed=2) * np.array(grid.sigma.shape[::-1])
-    way = points - grid.cells(EYE)
-    far = np.linalg.norm(way, axis=1)
-    return np.column_stack([way / far[:, None], np.where(random(count, seed=3) < 0.5, far, 1e5)]).astype(np.float32)
+    offset = points - grid.cells(EYE)
+    distance = np.linalg.norm(offset, axis=1)
+    length = np.where(random(count, seed=3) < 0.5, distance, 1e5)
+    return np.column_stack([offset / distance[:, None], length]).astype(np.float32)
 
 
 def test_beer_lambert_straight_and_aslant() -> None:
@@ -83,19 +84,19 @@ def test_beer_lambert_straight_and_aslant() -> None:
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     start = grid.cells(np.array([-0.5, -0.1, 5.0]))
     rays = np.column_stack([unit, np.full(3, 1e5)])
-    looked = march.look(opencl.to_device(sources(grid.sigma, 3.0)), grid.sigma.shape, rays, start)
+    marched = march.radiance(opencl.to_device(sources(grid.sigma, 3.0)), grid.sigma.shape, rays, start)
     passed = [np.exp(-4.0), np.exp(-4.0 * np.hypot(1.0, 0.1)), 1.0]
-    assert looked[:, 3] == pytest.approx(passed, rel=1e-4)
-    assert looked[:, 0] == pytest.approx(3.0 * (1.0 - np.array(passed)), rel=1e-4)
+    assert marched[:, 3] == pytest.approx(passed, rel=1e-4)
+    assert marched[:, 0] == pytest.approx(3.0 * (1.0 - np.array(passed)), rel=1e-4)
 
 
 def test_rays_end_at_surfaces_and_begin_where_they_begin() -> None:
     grid = slab()
     sent = opencl.to_device(sources(grid.sigma, 1.0))
     ahead = np.array([[0.0, 0.0, -1.0, 5.0 / 0.25]])
-    assert march.look(sent, grid.sigma.shape, ahead, grid.cells(np.array([0.0, 0.0, 5.0])))[0, 3] == pytest.approx(
+    assert march.radiance(sent, grid.sigma.shape, ahead, grid.cells(np.array([0.0, 0.0, 5.0])))[0, 3] == pytest.approx(
         np.exp(-2.0 * 0.875), rel=1e-4)
-    inside = march.look(sent, grid.sigma.shape, ahead, grid.cells(np.array([0.0, 0.0, 0.1])))
+    inside = march.radiance(sent, grid.sigma.shape, ahead, grid.cells(np.array([0.0, 0.0, 0.1])))
     assert inside[0, 3] == pytest.approx(np.exp(-2.0 * 1.225), rel=1e-4)
 
 
@@ -170,7 +171,7 @@ def test_the_same_bits_each_time() -> None:
 
 def test_a_lamp_in_the_smoke_is_refused() -> None:
     inside = dataclasses.replace(KEY, corner=np.array([0.0, 0.5, 0.0]) - 0.5 * sum(KEY.edges))
-    with pytest.raises(ValueError, match="a lamp stands in the smoke"):
+    with pytest.raises(ValueError, match="a lamp is inside the smoke"):
         march.source(cloud((5, 7, 6)), [inside], EYE, MEDIUM, DARK)
 
 
@@ -186,12 +187,12 @@ def test_source_equals_its_reference(shape: tuple[int, int, int]) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_look_and_shade_equal_their_references(shape: tuple[int, int, int]) -> None:
+def test_radiance_and_shade_equal_their_references(shape: tuple[int, int, int]) -> None:
     grid = cloud(shape)
     values = (random(*shape, 4, seed=8) * (grid.sigma > 0)[..., None]).astype(np.float32)
     rays = through_all(grid, 70)
-    looked = march.look(opencl.to_device(values), shape, rays, grid.cells(EYE))
-    assert looked == pytest.approx(march.look_reference(values, rays, grid.cells(EYE)), abs=2e-5)
+    marched = march.radiance(opencl.to_device(values), shape, rays, grid.cells(EYE))
+    assert marched == pytest.approx(march.radiance_reference(values, rays, grid.cells(EYE)), abs=2e-5)
     places = grid.cells(random(70, 3, seed=9) * [2.0, 0.5, 2.0] - [1.0, 0.2, 1.0])
     points = grid.cells(KEY.points(2))
     shares = march.shade(opencl.to_device(grid.sigma), shape, places, points)

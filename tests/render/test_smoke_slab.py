@@ -1,4 +1,4 @@
-"""render.sheet: the kernels against their NumPy reference, and light whose way is known."""
+"""render.smoke_slab: the kernels against their NumPy reference, and light whose result is known in advance."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ LAMPS = (
 )
 
 
-def test_depth_of_a_uniform_slab_grows_linearly_with_the_way_through_it() -> None:
+def test_depth_of_a_uniform_slab_grows_linearly_with_the_distance_through_it() -> None:
     """depth = sigma * rows above (half a cell less), straight and aslant, from either side."""
     sigma = np.full((20, 60), 0.1, np.float32)
     up = smoke_slab.depth_towards(sigma, (0.0, 1.0))
@@ -57,7 +57,7 @@ def test_no_smoke_is_passed_and_not_seen() -> None:
     assert not seen.sky.any() and not any(lamp.any() for lamp in seen.lamps)
 
 
-def test_a_full_sheet_passes_beer_lambert_and_a_thin_one_less_smoke() -> None:
+def test_a_full_slab_obeys_beer_lambert_and_a_thin_one_holds_less_smoke() -> None:
     """relief 1.1 fills all layers: exp(-depth); relief 0.5 fills half of them: exp(-depth / 2)."""
     depth = np.full((4, 4), 3.0, np.float32)
     full, half = (smoke_slab.light(depth, np.full_like(depth, r), 1.0, (), 1).passed for r in (1.1, 0.5))
