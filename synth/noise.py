@@ -13,15 +13,13 @@ import numpy as np
 
 
 def gradient_noise(points: Sequence[np.ndarray], seed: int) -> np.ndarray:
-    """Gradient noise at `points`: one coordinate array per dimension (1 to 4), in lattice units, broadcast
-    together.
+    """Gradient noise at `points`: one coordinate array per dimension (1 to 4), in lattice units, broadcast together.
 
-    Returns float64 within [-1, 1], twice differentiable, zero at lattice points, features about one unit
-    wide.
+    Returns float64 within [-1, 1], twice differentiable, zero at lattice points, features about one unit wide.
     """
     cells = [np.floor(p).astype(np.int64) for p in points]
-    within = [p - c for p, c in zip(points, cells, strict=True)]
-    fade = [t * t * t * (t * (t * 6 - 15) + 10) for t in within]
+    fraction = [p - c for p, c in zip(points, cells, strict=True)]
+    fade = [t * t * t * (t * (t * 6 - 15) + 10) for t in fraction]
     total = np.zeros(np.broadcast_shapes(*(p.shape for p in points)))
     for corner in itertools.product((0, 1), repeat=len(points)):
         key = _hash([c + step for c, step in zip(cells, corner, strict=True)], seed)
@@ -29,7 +27,7 @@ def gradient_noise(points: Sequence[np.ndarray], seed: int) -> np.ndarray:
         length = np.sqrt(sum(g * g for g in gradient)) + 1e-12
         weight = 1.0
         slope = 0.0
-        for t, f, step, g in zip(within, fade, corner, gradient, strict=True):
+        for t, f, step, g in zip(fraction, fade, corner, gradient, strict=True):
             weight = weight * (f if step else 1 - f)
             slope = slope + g * (t - step)
         total += weight * slope / length

@@ -59,8 +59,7 @@ def simulate(shape: tuple[int, ...], frames: int, *, seed: int, radius: float = 
 
 
 def vorticity(v: np.ndarray) -> np.ndarray:
-    """Curl by central differences, one-sided at the border: (Y, X, 2) -> (Y, X); (Z, Y, X, 3) -> the same
-    shape."""
+    """Curl by central differences, one-sided at the border: (Y, X, 2) -> (Y, X); (Z, Y, X, 3) -> the same shape."""
     dimension = v.ndim - 1
 
     def slope(component: int, along: int) -> np.ndarray:
@@ -72,8 +71,7 @@ def vorticity(v: np.ndarray) -> np.ndarray:
 
 
 def confining_force(v: np.ndarray) -> np.ndarray:
-    """N x vorticity, N the direction towards stronger vorticity [Fedkiw et al. 2001, eq. 9 to 11 without
-    epsilon].
+    """N x vorticity, N the direction towards stronger vorticity [Fedkiw et al. 2001, eq. 9 to 11, without epsilon].
 
     (Y, X, 2) or (Z, Y, X, 3) float32 -> the same shape, per frame.
     """

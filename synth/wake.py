@@ -42,14 +42,14 @@ def potential(x: np.ndarray, y: np.ndarray, time: float, *, seed: int, centre: S
     distance = np.hypot(from_x, from_y) - radius
     psi = flow * from_y * ramp(distance / influence)
     downstream = from_x * np.sign(flow)
-    within = np.minimum(1, ramp(1 + downstream / radius)) * smooth_step(
+    share = np.minimum(1, ramp(1 + downstream / radius)) * smooth_step(
         1 - np.abs(from_y) / (BEGINNING * radius + expansion * np.maximum(downstream, 0)))
-    reached = within > 0
+    reached = share > 0
     if reached.any():
         octaves = sum(gain * ramp(distance[reached] / length) * gradient_noise(
             [x[reached] / length, y[reached] / length, np.full(1, time)], seed * len(lengths) + number)
             for number, (length, gain) in enumerate(zip(lengths, gains, strict=True)))
-        psi[reached] += within[reached] * octaves
+        psi[reached] += share[reached] * octaves
     return psi
 
 
@@ -73,8 +73,8 @@ def wake(shape: tuple[int, ...], frames: int, *, seed: int, centre: tuple[float,
     lengths, gains  of the octaves of noise: size of their features (world units), amplitude of their potential
     step            units of time in a frame
     period          frames in which the noise turns over
-    Yields (Y, X, 2) float32, cells per frame. Raises ValueError for another dimension, or as many lengths as gains
-    are not.
+    Yields (Y, X, 2) float32, cells per frame. Raises ValueError for another dimension, or for numbers of lengths and
+    gains that differ.
     """
     if len(shape) != 2:
         raise ValueError(f"the wake is a flow of the plane, not of a shape of {shape}")

@@ -53,14 +53,14 @@ def sample_reference(field: np.ndarray, at: np.ndarray, toroidal: bool) -> np.nd
 def average_reference(exemplar: np.ndarray, position: np.ndarray, weight: np.ndarray, axis: np.ndarray,
                       grid: tuple[int, int], radius: int, spacing: int, prior: np.ndarray,
                       coherence: np.ndarray) -> np.ndarray:
-    """Specification of `average`: each site lays its match down, then every cell divides; arguments as there."""
+    """Specification of `average`: each site adds its match, every cell divides by its weights; arguments as there."""
     rows, columns = prior.shape[:2]
     sums, totals = np.zeros(prior.shape), np.zeros(prior.shape[:2])
     for s in range(len(position)):
         site = np.array([s % grid[1], s // grid[1]]) * spacing + spacing // 2
-        way_x, way_y = np.arange(columns) - site[0], (np.arange(rows) - site[1])[:, None]
+        offset_x, offset_y = np.arange(columns) - site[0], (np.arange(rows) - site[1])[:, None]
         e = axis[s]
-        offset = np.stack([e[0] * way_x + e[1] * way_y, e[0] * way_y - e[1] * way_x], axis=-1)
+        offset = np.stack([e[0] * offset_x + e[1] * offset_y, e[0] * offset_y - e[1] * offset_x], axis=-1)
         covered = np.abs(offset).max(axis=-1) <= radius + 0.001
         o = offset[covered].astype(np.float32)
         g = weight[s] * np.exp(-falloff(radius) * (o**2).sum(axis=-1))
@@ -86,19 +86,19 @@ def robust_weights(squared: Any, length: int, rms: float) -> Any:
     """
     weight = opencl.empty(squared.shape)
     _bare(1).robust(squared.shape, None, squared, np.float32(1 / (length * (EXACT * rms) ** 2)),
-                   np.float32(ROBUST / 2 - 1), weight)
+                    np.float32(ROBUST / 2 - 1), weight)
     return weight
 
 
 def _bare(channels: int) -> Any:
-    """The program for what has no neighbourhoods."""
+    """The program for kernels without neighbourhoods."""
     return opencl.program(Path(__file__).with_suffix(".cl"), RADIUS=0, SPACING=1, FIRST=0, REACH=0,
                           BORDER=CARRY_BORDER, CHANNELS=channels)
 
 
 @dataclass(frozen=True)
 class Assigner:
-    """Lays matches in an exemplar (N, M, K), K = 2 (of a potential 1), with sites `spacing` apart over the output."""
+    """Assigns the matches in an exemplar (N, M, K), K = 2 (of a potential 1), of sites at distances of `spacing`."""
 
     exemplar: np.ndarray
     radius: int
@@ -153,5 +153,5 @@ def carry(field: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     out = opencl.empty(field.shape)
     padded = np.pad(field, ((border, border), (border, border), (0, 0)), mode="edge")
     _bare(field.shape[2]).carry(field.shape[1::-1], None, opencl.to_device(padded), np.int32(padded.shape[1]),
-                  opencl.to_device(displacement), out)
+                                opencl.to_device(displacement), out)
     return out.get()

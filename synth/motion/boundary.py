@@ -61,16 +61,16 @@ def walls(distance: np.ndarray, levels: int, margin: int, target: np.ndarray | N
     return found
 
 
-def into_frame(normal: np.ndarray, frame: np.ndarray) -> np.ndarray:
+def into_local(normal: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """R^T n: normals (K, D) of the domain in the exemplar's coordinates.
 
-    frame  (K, 2) the local x axes of a plane (`synth.motion.local_axes`), or matrices (K, D, D) whose columns are the
+    axes   (K, 2) the local x axes in 2-D (`synth.motion.local_axes`), or matrices (K, D, D) whose columns are the
            local axes
     """
-    if frame.ndim == 3:
-        return np.einsum("kij,ki->kj", frame, normal)
-    along = frame[:, 0] * normal[:, 0] + frame[:, 1] * normal[:, 1]
-    across = frame[:, 0] * normal[:, 1] - frame[:, 1] * normal[:, 0]
+    if axes.ndim == 3:
+        return np.einsum("kij,ki->kj", axes, normal)
+    along = axes[:, 0] * normal[:, 0] + axes[:, 1] * normal[:, 1]
+    across = axes[:, 0] * normal[:, 1] - axes[:, 1] * normal[:, 0]
     return np.stack([along, across], axis=-1)
 
 
@@ -85,19 +85,19 @@ def impose_reference(x: np.ndarray, walls: Walls, normal: np.ndarray, hold: np.n
 
 
 class Constraint:
-    """Eq. 3 on one level in one frame, on the device.
+    """Eq. 3 on one level in one axes, on the device.
 
-    frame  (*shape, 2) local x axes or (*shape, D, D) matrices of the level's cells, margins and all
+    axes   (*shape, 2) local x axes or (*shape, D, D) matrices of the level's cells, margins and all
     """
 
-    def __init__(self, walls: Walls, frame: np.ndarray):
+    def __init__(self, walls: Walls, axes: np.ndarray):
         dimension = walls.normal.shape[1]
         self._count = len(walls.cells)
         if not self._count:
             return
-        at = frame.reshape(-1, *frame.shape[dimension:])[walls.cells]
+        at = axes.reshape(-1, *axes.shape[dimension:])[walls.cells]
         self._walls = [opencl.to_device(a) for a in (
-            walls.cells, into_frame(walls.normal, at).astype(np.float32), walls.target, walls.weight)]
+            walls.cells, into_local(walls.normal, at).astype(np.float32), walls.target, walls.weight)]
         self._dimension = dimension
 
     def impose(self, x: Any, hold: Any) -> None:

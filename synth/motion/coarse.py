@@ -1,5 +1,4 @@
-"""The coarse motion L (ma09 §3 step 1): simulated, procedural or analytic; and its upsampling (pseudocode
-1)."""
+"""The coarse motion L (ma09 §3 step 1): simulated, procedural or analytic; and its upsampling (pseudocode 1)."""
 
 from __future__ import annotations
 
@@ -53,8 +52,7 @@ FLOWS: dict[str, Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray
     "rotation": lambda x, y: (-y, x),
     "shear": lambda x, y: (y, np.zeros_like(x)),
     "saddle": lambda x, y: (x, -y),
-    "vortex-pair": lambda x, y: tuple(a - b for a, b in zip(_vortex(x + 0.4, y), _vortex(x - 0.4, y),
-    strict=True)),
+    "vortex-pair": lambda x, y: _difference(_vortex(x + 0.4, y), _vortex(x - 0.4, y)),
 }
 """The analytic flows, by name. All are free of divergence."""
 
@@ -65,15 +63,19 @@ def _vortex(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return -y * strength, x * strength
 
 
+def _difference(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    return a[0] - b[0], a[1] - b[1]
+
+
 def _analytic(shape: tuple[int, ...], frames: int, *, seed: int = 0, flow: str = "constant",
               speed: float = 1.0, angle: float = 0.0) -> Iterator[np.ndarray]:
     """A steady flow in the x-y plane (seed plays no part); the fastest cell moves at `speed`."""
     if flow not in FLOWS:
         raise ValueError(f"flow {flow!r} is none of {', '.join(FLOWS)}")
     half = shape[-2] / 2
-    y, x = np.meshgrid((np.arange(shape[-2]) + 0.5) / half - 1, (np.arange(shape[-1]) + 0.5) / half -
-    shape[-1] / shape[-2],
-                       indexing="ij")
+    rows = (np.arange(shape[-2]) + 0.5) / half - 1
+    columns = (np.arange(shape[-1]) + 0.5) / half - shape[-1] / shape[-2]
+    y, x = np.meshgrid(rows, columns, indexing="ij")
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     along, across = FLOWS[flow](c * x + s * y, c * y - s * x)
     v = np.zeros((*shape, len(shape)), np.float32)
@@ -91,11 +93,9 @@ def upsample(v: np.ndarray, shape: tuple[int, ...], kernel: str = "linear") -> n
     """`v` on the cells `shape` of the same domain (ma09 pseudocode 1, Upsample).
 
     v       (Y, X, 2) or (Z, Y, X, 3) float32, cells per frame of its own grid
-    shape   (Y', X') or (Z', Y', X') cells; each component is scaled by its axis's ratio, so that the motion
-    stays
-            the same in world units
-    kernel  "linear", or "cubic": interpolating and smooth (Catmull and Rom), which leaves no facets in what
-    the flow
+    shape   (Y', X') or (Z', Y', X') cells; each component is scaled by its axis's ratio, so that the motion stays the
+            same in world units
+    kernel  "linear", or "cubic": interpolating and smooth (Catmull and Rom), which leaves no facets in what the flow
             carries when the ratio is large
     Returns (*shape, D) float32, cells per frame of the new grid. The same shape returns v exactly.
     """

@@ -20,13 +20,11 @@ def combine(L: np.ndarray, H: np.ndarray, omega: float, weight: str | None = Non
     """F = upsample(L) + omega * weight * H.
 
     L           (Y, X, 2) or (Z, Y, X, 3) float32, cells per frame of its own, coarser grid
-    H           H' of the paper: the detail in world axes, after the coordinate transform, on the output
-    grid (its
+    H           H' of the paper: the detail in world axes, after the coordinate transform, on the output grid (its
                 magnitude is the exemplar's, at most about 1)
     omega       cells per frame of the output grid where |H| = 1
-    weight      None: omega everywhere; "kinetic-energy" or "vorticity": omega in proportion to that of L,
-    with mean
-                omega over the domain (zero where L is zero throughout)
+    weight      None: omega everywhere; "kinetic-energy" or "vorticity": in proportion to that of L, with mean omega
+                over the domain (zero where L is zero throughout)
     projection  None, or the border ("wall", "open", "toroidal") of the projection of F (§3.6)
     distance    cells to the wall of an obstacle, negative inside, that the projection lets nothing flow through
     Returns F, H's shape, float32, cells per frame of the output grid.
@@ -43,8 +41,7 @@ def combine(L: np.ndarray, H: np.ndarray, omega: float, weight: str | None = Non
 
 
 def weight_of(v: np.ndarray, weight: str) -> np.ndarray:
-    """Kinetic energy or vorticity magnitude of v, divided by its mean over the domain: (Y, X) or (Z, Y,
-    X)."""
+    """Kinetic energy or vorticity magnitude of v, divided by its mean over the domain: (Y, X) or (Z, Y, X)."""
     if weight not in WEIGHTS:
         raise ValueError(f"weight {weight!r} is none of {', '.join(WEIGHTS)}")
     if weight == "kinetic-energy":

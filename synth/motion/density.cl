@@ -53,16 +53,16 @@ kernel void step_lanes(global const float *restrict q, global const float *restr
 }
 
 #if CHANNELS == DIMS
-// Where the content of each cell comes from when the detail rides on L: back along the detail alone, in `substeps` of
-// displacement `detail` each, as L's traveller sees it; then back along L. All are (cells, DIMS).
+// Where the content of each cell comes from when the detail moves along with L: back along the detail alone, as seen
+// from a point carried by L, in `substeps` of displacement `detail` each; then back along L. All are (cells, DIMS).
 kernel void ride(global const float *restrict detail, global const float *restrict coarse,
                  global float *restrict displacements, const int substeps, const int X, const int Y, const int Z)
 {
     const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
     if (x >= X) return;
     const int cell = (z * Y + y) * X + x;
-    velocity way = LOAD(cell, detail);
-    for (int i = 1; i < substeps; i++) way += displaced(detail, way, x, y, z, X, Y, Z);
-    STORE(way + displaced(coarse, way, x, y, z, X, Y, Z), cell, displacements);
+    velocity displacement = LOAD(cell, detail);
+    for (int i = 1; i < substeps; i++) displacement += displaced(detail, displacement, x, y, z, X, Y, Z);
+    STORE(displacement + displaced(coarse, displacement, x, y, z, X, Y, Z), cell, displacements);
 }
 #endif

@@ -1,13 +1,13 @@
 """Smoke density carried by the motion: naive and windowed (ma09 supplement A, pseudocode 3 and 4).
 
     O_i = naive(L)_i                                          the smoke under the coarse motion alone
-    D_i = O_{i-m}, then m times: inject, advect by F_{i-m+j}   the smoke one sees
+    D_i = O_{i-m}, then m times: inject, advect by F_{i-m+j}   the smoke that is shown
 
 Each frame injects first and advects then. A source holds the density at its own pattern p where its mask is
-1, and lets go of it towards its soft edge: mask p <= D <= 1 - mask (1 - p). So smoke never piles up, the
-pattern stays crisp under the smoke that passes, and nothing depends on the frame rate.
+1, less strongly towards its soft edge: mask p <= D <= 1 - mask (1 - p). So smoke never accumulates, the
+pattern stays sharp where smoke flows through the source, and the result does not depend on the frame rate.
 
-Pseudocode 4 restarts each D_i and does m steps for it. Here the m windows that are under way advance side
+Pseudocode 4 restarts each D_i and does m steps for it. Here the m windows that are open advance side
 by side, one step per frame: the same numbers, bit for bit, with one departure map, no history of fields,
 and memory that does not grow with the frames. Cells that no smoke can reach are left out. `window` is one
 frame alone, as the pseudocode writes it, for a farm.
@@ -40,10 +40,10 @@ SUBSTEPS = 4
 """Steps in which smoke is traced along the detail of a frame."""
 
 MOTIONS = 24
-"""Fields of vectors that memory holds at once, on their own cells: as measured, what the allocator keeps included."""
+"""Vector fields on their own cells held in memory at once, as measured, including what the allocator keeps."""
 
 THINNEST = 1e-5
-"""Thinner smoke is gone: nobody can see it, and interpolation would spread it over the grid for ever."""
+"""Thinner smoke is set to zero: it is invisible, and interpolation would spread it over the whole grid."""
 
 
 @dataclass(frozen=True)
@@ -133,10 +133,10 @@ class Source:
 
 @dataclass(frozen=True)
 class Carried:
-    """One frame of F whose detail rides on L while the frame lasts, instead of standing still.
+    """One frame of F whose detail moves along with L during the frame, instead of standing still.
 
-    Smoke in a swirl that L carries on then follows the swirl's own paths; with F standing still it would be cut
-    by the swirl's edges anew in each frame, in teeth as long as L's step.
+    Smoke in a swirl that L carries then follows the swirl's own paths. With F standing still the edges of the swirl
+    would cut it anew in each frame, in teeth as long as L's step.
     F  (Y, X, 2) or (Z, Y, X, 3) float32, cells per frame;  L  on F's grid or a coarser one, as it went into F
     """
 
@@ -145,7 +145,7 @@ class Carried:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """That of F."""
+        """Shape of F."""
         return self.F.shape
 
 
@@ -161,8 +161,7 @@ def naive(F_frames: Iterable[Motion], sources: Sequence[Source], *, scale: float
     scale     cells of the density grid per cell of the field, along each axis; F is then interpolated
               smoothly (Catmull and Rom)
     border    beyond the grid "zero" (no smoke comes in), "clamp" or "toroidal"
-    Yields D_1, D_2, …: float32 in [0, 1], one array per frame, the caller's own; nothing between 0 and
-    THINNEST.
+    Yields D_1, D_2, …: float32 in [0, 1], a new array per frame, with no value between 0 and THINNEST.
     """
     density = None
     for i, F in enumerate(F_frames, 1):
@@ -254,14 +253,14 @@ def _around(*boxes: Box) -> Box:
 
 
 class _Flow:
-    """The displacements of one frame on the density grid, found where they are asked for.
+    """The displacements of one frame on the density grid, computed for a region on request.
 
     reach  no displacement is longer along any axis, cells
     """
 
     def __init__(self, v: Motion, field_shape: tuple[int, ...], grid: Grid, buffers: list[Any]):
         """v on its own cells goes linearly to the field's, from there smoothly to the density's. buffers: arrays of
-        displacements, one, or three for a detail that rides; they hold what this gives."""
+        displacements, one, or three for `Carried`; they hold the results."""
         self._grid, self._buffers = grid, buffers
         if isinstance(v, Carried):
             L = _finer(v.L, v.shape[:-1], grid)
@@ -279,18 +278,18 @@ class _Flow:
             return self._grid.departure(self._motions[0], out=self._buffers[0], region=region)
         inside = Grid(self._grid.shape, "toroidal" if self._grid.border == "toroidal" else "clamp")
         near = self._near(region)
-        way, detail, coarse = self._buffers
+        displacement, detail, coarse = self._buffers
         inside.departure(self._motions[0], 1 / SUBSTEPS, detail, near)
         inside.departure(self._motions[1], out=coarse, region=near)
         dimension = len(self._grid.shape)
         program = opencl.program(Path(__file__).with_suffix(".cl"), DIMS=dimension, CHANNELS=dimension,
                                  BORDER=BORDERS[inside.border], THINNEST=f"{THINNEST}f")
-        program.ride(region.size, (ROW, 1, 1), detail, coarse, way, np.int32(SUBSTEPS), *self._grid.cells,
+        program.ride(region.size, (ROW, 1, 1), detail, coarse, displacement, np.int32(SUBSTEPS), *self._grid.cells,
                      offset=region.first)
-        return way
+        return displacement
 
     def _near(self, region: Region) -> Region:
-        """The cells that a way which begins in `region` can pass."""
+        """The cells that a path which begins in `region` can cross."""
         if self._grid.border == "toroidal":
             return self._grid.whole
         grown = [(max(first - self.reach, 0), min(first + size + self.reach, n))
@@ -309,10 +308,10 @@ def riding_reference(L: np.ndarray, detail: np.ndarray, border: str = "zero") ->
     """Specification of the kernel `ride`: displacements of one frame of L and F - L, both (Y, X, 2) or (Z, Y, X, 3)."""
     inside = "toroidal" if border == "toroidal" else "clamp"
     substep = departure_reference(detail, 1 / SUBSTEPS, inside)
-    way = substep
+    displacement = substep
     for _ in range(SUBSTEPS - 1):
-        way = way + displaced_reference(substep, way, inside)
-    return way + displaced_reference(departure_reference(L, 1, inside), way, inside)
+        displacement = displacement + displaced_reference(substep, displacement, inside)
+    return displacement + displaced_reference(departure_reference(L, 1, inside), displacement, inside)
 
 
 def _longest(v: np.ndarray) -> int:
@@ -386,7 +385,7 @@ class _Lanes:
         return (*self.shape[::-1], 1)[:3]
 
     def _reached(self, reach: int) -> Box:
-        """The box that this frame's smoke can reach: `reach` cells further each way."""
+        """The box that this frame's smoke can reach: `reach` cells further on each side."""
         grown = []
         for (first, end), n in zip(self.box, self._size(), strict=True):
             wraps = self.grid.border == "toroidal" and first < end and (first < reach or end + reach > n)

@@ -33,14 +33,21 @@ COARSEST = 8
 STARTS = 8
 # how strongly a frame holds to the one before, advected; 1 is as much as all matches together
 COHERENCE = 6.0
-# the deformation in one frame, relative to the local frame, that halves this hold
+# the deformation in one frame, relative to the local axes, that halves this hold
 DEFORMED = 0.02
 
 
 @dataclass(frozen=True)
 class Settings:
-    """levels of the pyramid, widths of the neighborhoods in their order, iterations with each, search "exact" or
-    "k-coherence" with k candidates a neighbour; the axis of the exemplar, "x" or "y", that lies along L."""
+    """How a field is synthesized (§4, "Parameters").
+
+    levels         of the pyramid
+    neighborhoods  their widths, in the order in which they are used
+    iterations     of search and assignment with each width
+    search         "exact" or "k-coherence"
+    k              candidates that each neighbour offers in k-coherence
+    along          the axis of the exemplar, "x" or "y", that follows L
+    """
 
     levels: int
     neighborhoods: tuple[int, ...] = (17, 9)
@@ -51,13 +58,16 @@ class Settings:
 
     @property
     def few(self) -> int:
-        """Half the iterations: for a frame that flowed on and is nearly there, and to tell a good start from a bad."""
+        """Half the iterations: for a frame that starts from the one before, and to compare starts."""
         return (self.iterations + 1) // 2
 
 
 def enough_levels(size: int) -> int:
-    """As many levels as bring an exemplar of `size` cells down to 8: with fewer, the coarsest neighbourhoods see
-    less than a closed motif on an empty ground, and the empty field becomes the best match of all."""
+    """The number of levels that brings an exemplar of `size` cells down to 8.
+
+    With fewer, the coarsest neighbourhoods see less than a whole motif on an empty background, and the empty field
+    becomes the best match everywhere.
+    """
     return max(1, int(np.log2(size / COARSEST)) + 1)
 
 
@@ -77,25 +87,25 @@ class Level:
                 for width in self.settings.neighborhoods]
 
     def prepare(self) -> None:
-        """Make now what is else made when first asked for."""
+        """Build the search structures now instead of at the first search."""
         for _, matcher, _ in self.steps:
             matcher.prepare()
 
-    def optimize(self, H: np.ndarray, frame: np.ndarray, iterations: int,
+    def optimize(self, H: np.ndarray, axes: np.ndarray, iterations: int,
                  coherence: np.ndarray | None = None, boundary: Constraint | None = None) -> tuple[Any, Any]:
         """Search and assign, `iterations` times with each width of neighbourhoods.
 
-        H, frame (Y, X, 2); `coherence` (Y, X) holds the result to H as it came, the frame before, warped: the O(x)
+        H, axes (Y, X, 2); `coherence` (Y, X) holds the result to H as it came, the frame before, warped: the O(x)
         of Eq. 1; `boundary` is the E_n of Eq. 3. Returns H (Y, X, 2) and the squared distances (S,) of its last
-        matches, both still on the device, which works on while this returns.
+        matches; both are device arrays, and the device may still be computing them.
         """
         if coherence is None:
-            coherence = np.zeros(frame.shape[:2], np.float32)
+            coherence = np.zeros(axes.shape[:2], np.float32)
         x = prior = opencl.to_device(H)
         hold = opencl.to_device(coherence)
         for width, matcher, assigner in self.steps:
             at, grid = neighborhood.site_grid(H.shape[:2], width)
-            sites, axis = opencl.to_device(at), opencl.to_device(frame[at[:, 1], at[:, 0]])
+            sites, axis = opencl.to_device(at), opencl.to_device(axes[at[:, 1], at[:, 0]])
             z: Any = None
             for _ in range(iterations):
                 queries = matcher.space.project(x, sites, axis)
@@ -118,10 +128,10 @@ class Level:
 
 @dataclass(frozen=True)
 class State:
-    """All that the next frame needs: H and the local frame of each level, coarsest first, with their margins."""
+    """All that the next frame needs: H and the local axes of each level, coarsest first, with their margins."""
 
     H: list[np.ndarray]
-    frame: list[np.ndarray]
+    axes: list[np.ndarray]
 
 
 class Synthesis:
@@ -142,104 +152,128 @@ class Synthesis:
 
     def frame(self, L: np.ndarray, state: State | None) -> State:
         """The state after the frame with coarse motion L (Y, X, 2) cells per frame; None before the first."""
-        motions, frames = self.motions(L)
-        return State(self._first(frames) if state is None else self._next(motions, frames, state), frames)
+        motions, axes = self.motions(L)
+        return State(self._first(axes) if state is None else self._next(motions, axes, state), axes)
 
     def motions(self, L: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """L (Y, X, 2) and its local frames on each level, coarsest first, continued over the margin."""
+        """L (Y, X, 2) and its local axes on each level, coarsest first, continued over the margin."""
         motions = [motion / np.float32(2 ** (len(self.levels) - 1 - i))
                    for i, motion in enumerate(pyramid.pyramid(L, len(self.levels), toroidal=False))]
-        # before the margins: these are the frames that turn H into H' afterwards
-        frames = [_margin(axes_2d(motion, self.along)) for motion in motions]
-        return [_margin(motion) for motion in motions], frames
+        # before the margins: these are the axes that turn H into H' afterwards
+        axes = [_margin(axes_2d(motion, self.along)) for motion in motions]
+        return [_margin(motion) for motion in motions], axes
 
-    def _first(self, frames: list[np.ndarray]) -> list[np.ndarray]:
+    def _first(self, axes: list[np.ndarray]) -> list[np.ndarray]:
         """H of each level of the first frame: the coarsest from a mosaic, each other from the one before."""
-        done = [self._start(frames[0])]
-        for i, (level, frame) in enumerate(zip(self.levels[1:], frames[1:], strict=True), start=1):
-            H = initialize.reseed(_finer(done[-1], frame.shape[:2]), level.exemplar, frame)
-            done.append(level.optimize(H, frame, level.settings.iterations,
-                                       boundary=self._boundary(i, frame))[0].get())
+        done = [self._start(axes[0])]
+        for i, (level, local) in enumerate(zip(self.levels[1:], axes[1:], strict=True), start=1):
+            H = initialize.reseed(_finer(done[-1], local.shape[:2]), level.exemplar, local)
+            done.append(level.optimize(H, local, level.settings.iterations,
+                                       boundary=self._boundary(i, local))[0].get())
         return done
 
-    def _next(self, motions: list[np.ndarray], frames: list[np.ndarray], state: State) -> list[np.ndarray]:
-        """H of each level of a later frame: what flowed here, corrected, held the more the less it was deformed."""
-        ways = [departure(motion) for motion in motions]
-        warped = [assignment.carry(H, way) for H, way in zip(state.H, ways, strict=True)]
+    def _next(self, motions: list[np.ndarray], axes: list[np.ndarray], state: State) -> list[np.ndarray]:
+        """H of each level of a later frame (pseudocode 1, §3.4).
+
+        1. Carry each level of the frame before along L.
+        Then for each level, coarsest first:
+        2. Add what the coarser level has changed to what was carried here. Cells whose content flowed in across the
+           border during this frame take all of the coarser level's H.
+        3. Place a whole exemplar wherever the detail has run empty.
+        4. Choose how strongly to hold to the result: less where the flow deforms the detail, not at all at an inflow.
+        5. Search and assign.
+        """
+        # 1. carry
+        displacements = [departure(motion) for motion in motions]
+        warped = [assignment.carry(H, displacement) for H, displacement in zip(state.H, displacements, strict=True)]
         done: list[np.ndarray] = []
         for i, level in enumerate(self.levels):
+            # 2. correct by the coarser level
             H = warped[i]
-            inland = distance_inland(ways[i])
-            if i > 0:  # what the coarser level changed, on top of what flowed here, or all it knows of what flowed in
+            inland = distance_inland(displacements[i])
+            if i > 0:
                 H = np.where(inland[..., None] < 1, _finer(done[-1], H.shape[:2]),
                              H + _finer(done[-1] - warped[i - 1], H.shape[:2]))
-            H = initialize.reseed(H, level.exemplar, frames[i])
-            bent = deformation(ways[i], state.frame[i], frames[i]) / DEFORMED
-            # there is nothing to hold to in what flowed in: it takes shape on its way through the margin
+            # 3. reseed
+            H = initialize.reseed(H, level.exemplar, axes[i])
+            # 4. hold; what flowed in has no earlier frame to hold to, and takes shape while it crosses the margin
+            bent = deformation(displacements[i], state.axes[i], axes[i]) / DEFORMED
             hold = COHERENCE / (1 + bent**2) * np.minimum(inland / MARGIN, 1)
-            done.append(level.optimize(H, frames[i], level.settings.few, hold,
-                                       self._boundary(i, frames[i]))[0].get())
+            # 5. search and assign
+            done.append(level.optimize(H, axes[i], level.settings.few, hold,
+                                       self._boundary(i, axes[i]))[0].get())
         return done
 
-    def _boundary(self, level: int, frame: np.ndarray) -> Constraint | None:
-        """E_n of a level with these local frames."""
-        return None if self.walls is None else Constraint(self.walls[level], frame)
+    def _boundary(self, level: int, axes: np.ndarray) -> Constraint | None:
+        """E_n of a level with these local axes."""
+        return None if self.walls is None else Constraint(self.walls[level], axes)
 
     def visible(self, state: State) -> np.ndarray:
         """H (Y, X, 2) of a state, without its margin."""
         return np.ascontiguousarray(state.H[-1][MARGIN:-MARGIN, MARGIN:-MARGIN])
 
-    def _start(self, frame: np.ndarray) -> np.ndarray:
-        """The coarsest level of the first frame: of several mosaics the one that promises most, optimized."""
+    def _start(self, axes: np.ndarray) -> np.ndarray:
+        """The coarsest level of the first frame.
+
+        1. Lay STARTS mosaics of whole exemplars, each with its own random numbers.
+        2. Optimize each with half the iterations.
+        3. Keep the one with the best score: the distance to its matches, plus how far its rms is from the exemplar's.
+        4. Place a whole exemplar wherever the best has run empty, and optimize it with all iterations.
+        """
         level = self.levels[0]
         rms = np.sqrt(np.mean(level.exemplar**2))
-        boundary = self._boundary(0, frame)
+        boundary = self._boundary(0, axes)
         randoms = [np.random.Generator(np.random.Philox(key=[self.seed, start])) for start in range(STARTS)]
-        # the device works on one after the other; the host waits for none
-        trials = [level.optimize(mosaic, frame, level.settings.few, boundary=boundary)
-                  for mosaic in initialize.mosaics(level.exemplar, frame, randoms)]
-        for finer in self.levels[1:]:  # meanwhile
+        # 1. and 2.; the device works on one after the other, the host waits for none
+        trials = [level.optimize(mosaic, axes, level.settings.few, boundary=boundary)
+                  for mosaic in initialize.mosaics(level.exemplar, axes, randoms)]
+        for finer in self.levels[1:]:  # while the device works
             finer.prepare()
         best, least = None, np.inf
         for optimized, squared in trials:
             H = optimized.get()
             inside = H[MARGIN:-MARGIN, MARGIN:-MARGIN]
-            # the distance alone would choose the emptiest
+            # 3. the distance alone would choose the emptiest
             score = level.distance(squared) + abs(np.sqrt(np.mean(inside**2)) / rms - 1)
             if score < least:
                 best, least = H, score
         assert best is not None
-        best = initialize.reseed(best, level.exemplar, frame)
-        return level.optimize(best, frame, level.settings.iterations, boundary=boundary)[0].get()
+        # 4.
+        best = initialize.reseed(best, level.exemplar, axes)
+        return level.optimize(best, axes, level.settings.iterations, boundary=boundary)[0].get()
 
 
-def distance_inland(way: np.ndarray) -> np.ndarray:
-    """Cells upstream from each cell to the border, (Y, X) float32, 0 where it flowed in during this frame; straight
-    back along way (Y, X, 2), which leads to the departure point."""
-    frames = np.full(way.shape[:2], np.inf, np.float32)
-    for component, position in enumerate(np.ogrid[:way.shape[0], :way.shape[1]][::-1]):
-        speed = way[..., component]
-        room = np.where(speed < 0, position, way.shape[1 - component] - 1 - position).astype(np.float32)
+def distance_inland(displacement: np.ndarray) -> np.ndarray:
+    """Cells upstream from each cell to the border, (Y, X) float32, 0 where its content flowed in during this frame.
+
+    Measured straight back along displacement (Y, X, 2), which leads to the departure point.
+    """
+    frames = np.full(displacement.shape[:2], np.inf, np.float32)
+    for component, position in enumerate(np.ogrid[:displacement.shape[0], :displacement.shape[1]][::-1]):
+        speed = displacement[..., component]
+        room = np.where(speed < 0, position, displacement.shape[1 - component] - 1 - position).astype(np.float32)
         np.minimum(frames, np.divide(room, np.abs(speed), out=np.full_like(frames, np.inf), where=speed != 0),
                    out=frames)
-    return np.where(frames < 1, np.float32(0), frames * np.maximum(np.linalg.norm(way, axis=-1), np.float32(1e-6)))
+    length = np.maximum(np.linalg.norm(displacement, axis=-1), np.float32(1e-6))
+    return np.where(frames < 1, np.float32(0), frames * length)
 
 
-def deformation(way: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """How far the flow bends the detail out of its local frame in one step: (Y, X) float32, 0 for a rigid one.
+def deformation(displacement: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """How far the flow bends the detail out of its local axes in one step: (Y, X) float32, 0 for a rigid one.
 
-    |R_after^T G R_before - 1| (Frobenius), G the gradient of the motion that ends in each cell; way (Y, X, 2) is
-    the displacement back to the departure point, before and after the local frames (Y, X, 2).
+    |R_after^T G R_before - 1| (Frobenius), G the gradient of the motion that ends in each cell; displacement (Y, X, 2)
+    leads back to the departure point; before, after (Y, X, 2) are the local axes.
     """
-    forward = -way
+    forward = -displacement
     # G = 1 + grad(u), to first order in one frame's displacement u
-    dy, dx = np.gradient(forward, axis=(0, 1)) if min(way.shape[:2]) > 1 else (np.zeros_like(way),) * 2
-    old = assignment.carry(before, way)
+    flat = min(displacement.shape[:2]) == 1
+    dy, dx = (np.zeros_like(displacement),) * 2 if flat else np.gradient(forward, axis=(0, 1))
+    old = assignment.carry(before, displacement)
     old /= np.maximum(np.linalg.norm(old, axis=-1, keepdims=True), 1e-6)
     # the columns of G R_before
-    axes = [np.stack([old[..., 0], old[..., 1]], -1), np.stack([-old[..., 1], old[..., 0]], -1)]
-    total = np.zeros(way.shape[:2], np.float32)
-    for i, axis in enumerate(axes):
+    columns = [np.stack([old[..., 0], old[..., 1]], -1), np.stack([-old[..., 1], old[..., 0]], -1)]
+    total = np.zeros(displacement.shape[:2], np.float32)
+    for i, axis in enumerate(columns):
         moved = axis + axis[..., :1] * dx + axis[..., 1:] * dy
         along = np.sum(after * moved, -1) - (i == 0)
         across = after[..., 0] * moved[..., 1] - after[..., 1] * moved[..., 0] - (i == 1)

@@ -1,9 +1,9 @@
-"""Smoke in the plane given a body, so that a 2-D result can be rendered as a true volume.
+"""A volume from 2-D smoke, so that a 2-D result can be rendered as a true volume.
 
-Carried straight through a volume by (F_x, F_y, 0), smoke keeps its pattern in every layer; what the volume
-adds is how deep it reaches. One depth for all looks cut out of a board, and a body of revolution hides each
-motif behind the smoke before it. Here each part is about as deep as it is wide: a filament becomes a round
-thread, a cloud a rounded body, and the pattern still reads from the front.
+Carried straight through a volume by (F_x, F_y, 0), smoke keeps its pattern in every layer; only its depth is free.
+With one depth for all it looks cut out of a board, and a body of revolution hides each motif behind the smoke in front
+of it. Here each part is about as deep as it is wide: a filament becomes a round thread, a cloud a rounded body, and
+the pattern is still visible from the front.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ def layers(rows: int, reach: float) -> int:
 
 
 def _relief(D: np.ndarray) -> np.ndarray:
-    """By what dense ridges deepen a body and thin grooves flatten it: a factor round 1.
+    """The factor, about 1, by which dense ridges deepen a body and thin grooves flatten it.
 
     Without it dense smoke is one smooth body and hides the motifs in it. Densities are compared with the mean of the
-    smoke round them, not with the air, so a thread of even density stays as it is.
+    smoke around them, not with the air, so a thread of even density is unchanged.
     """
     occupied = -np.expm1(-np.float32(OCCUPIED) * D)
     factor = np.ones_like(D)

@@ -1,7 +1,7 @@
-// The mosaic that a synthesis starts from (ma09 §3.4): which tile, a square turned with the flow, holds a cell.
+// The mosaic that a synthesis starts from (ma09 §3.4): which tile, a square rotated with the flow, holds a cell.
 
-// For each of cells (P, as x, y) in each mosaic the centre from which it is least far in the greater of the two
-// coordinates of the centre's frame, the lowest number of several; and its offset in that frame.
+// For each of cells (P, as x, y) in each mosaic the centre from which it is least far in the greater of its two
+// local coordinates there, the lowest number of several; and its local coordinates (offset).
 // centres, axis (mosaics, count) in order of the buckets that they lie in, name (mosaics, count) their numbers;
 // starts (mosaics, buckets + 1) where each bucket begins; buckets (grid), row by row, are `edge` cells wide.
 __kernel void owners(__global const float2 *cells, __global const float2 *centres, __global const float2 *axis,
@@ -28,8 +28,8 @@ __kernel void owners(__global const float2 *cells, __global const float2 *centre
                 if (x < 0 || x >= grid.x) continue;
                 const int bucket = y * grid.x + x;
                 for (int c = starts[bucket]; c < starts[bucket + 1]; c++) {
-                    const float2 way = cell - centres[c], e = axis[c];
-                    const float2 o = (float2)(e.x * way.x + e.y * way.y, e.x * way.y - e.y * way.x);
+                    const float2 from_centre = cell - centres[c], e = axis[c];
+                    const float2 o = (float2)(e.x * from_centre.x + e.y * from_centre.y, e.x * from_centre.y - e.y * from_centre.x);
                     const float away = max(fabs(o.x), fabs(o.y));
                     if (away < least || (away == least && name[c] < found)) {
                         least = away;

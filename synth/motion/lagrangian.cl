@@ -91,8 +91,8 @@ __kernel void assign(__global const float2 *exemplar, int pitch, float falloff, 
         const int begin = first[by * bins.x + max(middle.x - 1, 0)];
         const int end = first[by * bins.x + min(middle.x + 1, bins.x - 1) + 1];
         for (int s = begin; s < end; s++) {
-            const float2 e = axis[s], way = point - sites[s];
-            const float2 o = (float2)(e.x * way.x + e.y * way.y, e.x * way.y - e.y * way.x);
+            const float2 e = axis[s], offset = point - sites[s];
+            const float2 o = (float2)(e.x * offset.x + e.y * offset.y, e.x * offset.y - e.y * offset.x);
             if (max(fabs(o.x), fabs(o.y)) > RADIUS) continue;
             const float w = exp(-falloff * dot(o, o)) * weight[s];
             sum = fma(w, spread_sample(exemplar, pitch, position[s] + o), sum);

@@ -7,7 +7,7 @@ where it thins them new ones are put in. Search and assignment are those of `syn
 at some of the samples, see the field between the samples by moving least squares, find their best match by the same
 search, and each sample becomes the weighted average of the matches that cover it.
 
-    p  sample, at `at` cells of its level      e  local x axis      o  offset in a local frame, in cells
+    p  sample, at `at` cells of its level      e  local x axis      o  offset along local axes, in cells
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from synth.motion import detail, initialize, neighborhood
 from synth.motion.assignment import falloff, robust_weights, sample_reference
 from synth.motion.detail import COHERENCE, DEFORMED, MARGIN, Level, Settings, deformation, distance_inland
 
-# samples see each other this far, in cells of their level; the nearer, the more: within sqrt(NEAR) all alike
+# how far samples see each other, in cells of their level; nearer ones weigh more, within sqrt(NEAR) all the same
 REACH = 1.6
 NEAR = 0.02
-# of two samples nearer than this one goes; a cell without a sample this near gets one
+# of two samples nearer than CROWDED one is removed; a cell with no sample within THIN gets one
 CROWDED = 0.4
 THIN = 0.8
-# the kernel sees samples eight together: so many of no meaning follow the last
+# the kernel reads eight samples at a time: so many of padding follow the last
 TOGETHER = 8
 
 
@@ -74,15 +74,15 @@ def gather_reference(at: np.ndarray, value: np.ndarray, sites: np.ndarray, axis:
         points = np.clip(centre + np.stack([e[0] * i - e[1] * j, e[1] * i + e[0] * j], -1), 0,
                          np.array(shape[::-1]) - 1)
         for n, point in enumerate(points):
-            way = (at - point).astype(np.float64)
-            squared = (way**2).sum(-1)
+            offset = (at - point).astype(np.float64)
+            squared = (offset**2).sum(-1)
             w = np.maximum(1 - squared / REACH**2, 0) ** 2 / (squared + NEAR)
             if w.sum() == 0:
                 continue
             w = w / w.sum()
-            mean, middle = w @ value, w @ way
-            spread = (way - middle).T @ (w[:, None] * (way - middle)) + NEAR * np.eye(2)
-            slopes = np.linalg.solve(spread, (way - middle).T @ (w[:, None] * (value - mean)))
+            mean, middle = w @ value, w @ offset
+            spread = (offset - middle).T @ (w[:, None] * (offset - middle)) + NEAR * np.eye(2)
+            slopes = np.linalg.solve(spread, (offset - middle).T @ (w[:, None] * (value - mean)))
             out[s, n] = mean - middle @ slopes
     return out.reshape(len(sites), -1).astype(np.float32)
 
@@ -92,8 +92,8 @@ def assign_reference(exemplar: np.ndarray, radius: int, sites: np.ndarray, posit
     """Specification of `assign`; arguments as there."""
     sums, totals = np.zeros(prior.shape), np.zeros(len(at))
     for s in range(len(sites)):
-        way, e = at - sites[s], axis[s]
-        o = np.stack([e[0] * way[:, 0] + e[1] * way[:, 1], e[0] * way[:, 1] - e[1] * way[:, 0]], -1)
+        offset, e = at - sites[s], axis[s]
+        o = np.stack([e[0] * offset[:, 0] + e[1] * offset[:, 1], e[0] * offset[:, 1] - e[1] * offset[:, 0]], -1)
         covered = np.abs(o).max(axis=-1) <= radius
         g = weight[s] * np.exp(-falloff(radius) * (o[covered] ** 2).sum(-1))
         sums[covered] += g[:, None] * sample_reference(exemplar, position[s] + o[covered], toroidal=True)
@@ -175,7 +175,7 @@ def assign(exemplar: np.ndarray, radius: int, sites: np.ndarray, position: Any, 
 
 
 def _site_edge(radius: int) -> float:
-    """Bins of sites: however turned, a neighbourhood of another than the next bin reaches not so far."""
+    """The edge of a bin of sites: no neighbourhood, however rotated, reaches beyond the adjacent bins."""
     return float(np.ceil(np.sqrt(2) * radius))
 
 
@@ -204,7 +204,7 @@ def seeded(shape: tuple[int, int], random: np.random.Generator) -> np.ndarray:
 
 
 def chosen(at: np.ndarray, rank: np.ndarray, spacing: int) -> np.ndarray:
-    """Samples at which neighbourhoods stand, about one in spacing^2: those of the lowest rank around. Indices (S,).
+    """Samples at which neighbourhoods are centred, about one in spacing^2: of the lowest rank nearby. Indices (S,).
 
     Ranks stay with their samples, so the neighbourhoods move with the flow too.
     """
@@ -236,14 +236,14 @@ def thin(at: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 class State:
     """All that the next frame needs, of each level, coarsest first: its samples, with their margins.
 
-    at (P, 2) float32, cells of the level and its margin; H (P, 2) float32; rank (P,) float64; frame (Y, X, 2), the
-    local frames of its grid; `number` holds the number of the frame once.
+    at (P, 2) float32, cells of the level and its margin; H (P, 2) float32; rank (P,) float64; axes (Y, X, 2), the
+    local axes of its grid; `number` holds the number of the frame once.
     """
 
     at: list[np.ndarray]
     H: list[np.ndarray]
     rank: list[np.ndarray]
-    frame: list[np.ndarray]
+    axes: list[np.ndarray]
     number: list[np.ndarray]
 
 
@@ -252,53 +252,53 @@ class Synthesis(detail.Synthesis):
 
     def __init__(self, exemplar: np.ndarray, shape: tuple[int, int], settings: Settings, seed: int):
         if settings.search != "exact":
-            raise ValueError("samples that move have no fixed neighbours for k-coherence to ask: search exactly")
+            raise ValueError("moving samples have no fixed neighbours, which k-coherence needs: use search = \"exact\"")
         super().__init__(exemplar, shape, settings, seed)
 
     def frame(self, L: np.ndarray, state: State | None) -> State:  # type: ignore[override]
         """The state after the frame with coarse motion L (Y, X, 2) cells per frame; None before the first."""
-        motions, frames = self.motions(L)
+        motions, axes = self.motions(L)
         number = 1 if state is None else int(state.number[0]) + 1
         # counter-based: what is drawn depends on seed, frame and level only
         randoms = [np.random.Generator(np.random.Philox(key=[self.seed, (number << 8) + 128 + level]))
                    for level in range(len(self.levels))]
-        levels = self._first_samples(frames, randoms) if state is None else self._moved(motions, frames, state, randoms)
+        levels = self._first_samples(axes, randoms) if state is None else self._moved(motions, axes, state, randoms)
         at, H, rank = (list(parts) for parts in zip(*levels, strict=True))
-        return State(at, H, rank, frames, [np.array(number)])
+        return State(at, H, rank, axes, [np.array(number)])
 
-    def _first_samples(self, frames: list[np.ndarray],
+    def _first_samples(self, axes: list[np.ndarray],
                        randoms: list[np.random.Generator]) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """at, H and rank of each level of the first frame: the coarsest from a mosaic, each other from the last."""
         coarser: tuple[Cloud, np.ndarray] | None = None
-        for level, frame, random in zip(self.levels, frames, randoms, strict=True):
-            samples, _ = cloud(seeded(frame.shape[:2], random), frame.shape[:2])
+        for level, local, random in zip(self.levels, axes, randoms, strict=True):
+            samples, _ = cloud(seeded(local.shape[:2], random), local.shape[:2])
             rank = random.random(len(samples.at))
             if coarser is None:
-                H = _at_points(self._start(frame), samples.at)
+                H = _at_points(self._start(local), samples.at)
             else:
                 H = coarser[0].values_at(coarser[1], _coarser(samples.at))
-            H = _resown(samples, H, level, frame)
-            H = optimize(level, samples, H, rank, frame, level.settings.iterations)
+            H = _reseeded(samples, H, level, local)
+            H = optimize(level, samples, H, rank, local, level.settings.iterations)
             coarser = samples, H
             yield samples.at, H, rank
 
-    def _moved(self, motions: list[np.ndarray], frames: list[np.ndarray], state: State,
+    def _moved(self, motions: list[np.ndarray], axes: list[np.ndarray], state: State,
                randoms: list[np.random.Generator]) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """at, H and rank of each level of a later frame: what flowed here, corrected, held as on a grid."""
+        """at, H and rank of each level of a later frame, by the steps of `detail.Synthesis._next`."""
         coarser: tuple[Cloud, np.ndarray, np.ndarray] | None = None
         for i, level in enumerate(self.levels):
-            frame, way = frames[i], departure(motions[i])
+            local, offset = axes[i], departure(motions[i])
             samples, H, rank = carried(state.at[i], state.H[i], state.rank[i], motions[i], randoms[i])
-            inland = _at_points(np.minimum(distance_inland(way), MARGIN), samples.at)
+            inland = _at_points(np.minimum(distance_inland(offset), MARGIN), samples.at)
             flowed = H
-            if coarser is not None:  # what the coarser level changed, on top of what flowed here; all of what flowed in
+            if coarser is not None:  # add what the coarser level changed; where content flowed in, take all of it
                 above, whole, change = coarser
                 at = _coarser(samples.at)
                 H = np.where(inland[:, None] < 1, above.values_at(whole, at), H + above.values_at(change, at))
-            H = _resown(samples, H, level, frame)
-            bent = _at_points(deformation(way, state.frame[i], frame), samples.at) / DEFORMED
+            H = _reseeded(samples, H, level, local)
+            bent = _at_points(deformation(offset, state.axes[i], local), samples.at) / DEFORMED
             hold = COHERENCE / (1 + bent**2) * (inland / MARGIN)
-            H = optimize(level, samples, H, rank, frame, level.settings.few, hold)
+            H = optimize(level, samples, H, rank, local, level.settings.few, hold)
             coarser = samples, H, H - flowed
             yield samples.at, H, rank
 
@@ -316,18 +316,18 @@ class Synthesis(detail.Synthesis):
 
 def carried(at: np.ndarray, H: np.ndarray, rank: np.ndarray, motion: np.ndarray,
             random: np.random.Generator) -> tuple[Cloud, np.ndarray, np.ndarray]:
-    """Samples at (P, 2) with H (P, 2) and rank (P,) after a frame of motion (Y, X, 2), cells; even again.
+    """Samples at (P, 2) with H (P, 2) and rank (P,) after a frame of motion (Y, X, 2), cells; evenly spread again.
 
-    By the midpoint rule. What leaves the domain is gone, what crowds is taken out; what is thin is filled from the
-    samples around (where there are none, at an inflow, from the nearest).
+    By the midpoint rule. Samples that leave the domain or are crowded are removed; thin places are filled, their H
+    fitted to the samples around (at an inflow, where there are none, the nearest sample's).
     """
     shape = (motion.shape[0], motion.shape[1])
     moved = at + _at_points(motion, at + 0.5 * _at_points(motion, at))
     last = np.array(shape[::-1], np.float32) - 1
     stays = ((moved >= -0.5) & (moved <= last + 0.5)).all(axis=1)
     moved, H, rank = moved[stays], H[stays], rank[stays]
-    alone = ~crowded(moved, rank)
-    moved, H, rank = moved[alone], H[alone], rank[alone]
+    uncrowded = ~crowded(moved, rank)
+    moved, H, rank = moved[uncrowded], H[uncrowded], rank[uncrowded]
     new = thin(moved, shape)
     new = np.clip(new + random.uniform(-0.25, 0.25, new.shape), 0, last).astype(np.float32)
     before, order = cloud(moved, shape)
@@ -337,11 +337,11 @@ def carried(at: np.ndarray, H: np.ndarray, rank: np.ndarray, motion: np.ndarray,
     return samples, np.concatenate([H, filled])[order], np.concatenate([rank, random.random(len(new))])[order]
 
 
-def optimize(level: Level, samples: Cloud, H: np.ndarray, rank: np.ndarray, frame: np.ndarray, iterations: int,
+def optimize(level: Level, samples: Cloud, H: np.ndarray, rank: np.ndarray, axes: np.ndarray, iterations: int,
              coherence: np.ndarray | None = None) -> np.ndarray:
     """Search and assign at the samples, `iterations` times with each width of neighbourhoods, as `Level.optimize`.
 
-    H (P, 2), rank (P,) and coherence (P,) of the samples, frame (Y, X, 2) of the grid. Returns H (P, 2).
+    H (P, 2), rank (P,) and coherence (P,) of the samples, axes (Y, X, 2) of the grid. Returns H (P, 2).
     """
     x = prior = opencl.to_device(_followed(H))
     hold = opencl.to_device(np.zeros(len(H), np.float32) if coherence is None else coherence.astype(np.float32))
@@ -349,7 +349,7 @@ def optimize(level: Level, samples: Cloud, H: np.ndarray, rank: np.ndarray, fram
         radius = width // 2
         sites = samples.at[chosen(samples.at, rank, neighborhood.spacing(width))]
         sites = sites[site_bins(sites, samples.shape, radius).order]
-        axis = _axes(frame, sites)
+        axis = _axes(axes, sites)
         for _ in range(iterations):
             queries = matcher.space.compare(samples.gather(x, sites, axis, radius), len(sites))
             z, squared = matcher.exact(queries)
@@ -359,12 +359,12 @@ def optimize(level: Level, samples: Cloud, H: np.ndarray, rank: np.ndarray, fram
     return np.asarray(x.get()[:len(H)])
 
 
-def _axes(frame: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _axes(axes: np.ndarray, points: np.ndarray) -> np.ndarray:
     """The local x axes (P, 2) at points (P, 2) of the grid's (Y, X, 2); of the nearest cell where they cancel."""
-    e = _at_points(frame, points)
+    e = _at_points(axes, points)
     length = np.linalg.norm(e, axis=-1, keepdims=True)
-    cell = np.clip(np.rint(points).astype(int), 0, np.array(frame.shape[1::-1]) - 1)
-    return np.where(length > 0.1, e / np.maximum(length, 0.1), frame[cell[:, 1], cell[:, 0]]).astype(np.float32)
+    cell = np.clip(np.rint(points).astype(int), 0, np.array(axes.shape[1::-1]) - 1)
+    return np.where(length > 0.1, e / np.maximum(length, 0.1), axes[cell[:, 1], cell[:, 0]]).astype(np.float32)
 
 
 def _coarser(at: np.ndarray) -> np.ndarray:
@@ -372,12 +372,12 @@ def _coarser(at: np.ndarray) -> np.ndarray:
     return at * np.float32(0.5) + np.float32(MARGIN / 2 - 0.25)
 
 
-def _resown(samples: Cloud, H: np.ndarray, level: Level, frame: np.ndarray) -> np.ndarray:
-    """H (P, 2) with a whole exemplar laid into each place that has run empty, as `initialize.reseed` on a grid."""
+def _reseeded(samples: Cloud, H: np.ndarray, level: Level, axes: np.ndarray) -> np.ndarray:
+    """H (P, 2) with a whole exemplar placed wherever it has run empty, as by `initialize.reseed`."""
     grid = samples.on_grid(H)
-    # between samples the finest waves are flatter, which is no emptiness
+    # interpolation flattens the finest waves; that does not make a place empty
     grid *= np.sqrt(np.mean(H**2) / max(float(np.mean(grid**2)), 1e-12))
-    sown = initialize.reseed(grid, level.exemplar, frame)
+    sown = initialize.reseed(grid, level.exemplar, axes)
     changed = (sown != grid).any(axis=-1)
     if not changed.any():
         return H

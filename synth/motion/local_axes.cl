@@ -1,4 +1,4 @@
-// Local frames of a solid flow (ma09 §3.3), one voxel to a work-item.
+// Local axes of a flow in 3-D (ma09 §3.3), one voxel to a work-item.
 // -D ALONG  the local axis that follows L: 0 or 1
 
 inline float3 lattice_sample(__global const float *lattice, int3 size, float3 at) {

@@ -1,8 +1,8 @@
-"""Local frames of the coarse motion, and the coordinate transformation (ma09 §3.1 figure 2, §3.3).
+"""Local axes of the coarse motion, and the coordinate transformation (ma09 §3.1 figure 2, §3.3).
 
-In 2D the frame is completely defined by L. In 3D L gives one axis and a second direction, `towards`, the others:
+In 2-D the axes are completely defined by L. In 3-D L gives one axis and a second direction, `towards`, the others:
 from the density (`outward`) or from vectors placed by hand (`interpolated_directions`). Where that direction runs
-along L it says nothing, so it is spread across such places on a lattice coarser than the field.
+along L it determines nothing, so neighbouring values are spread there, on a lattice coarser than the field.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy.interpolate import RBFInterpolator
 
 from synth import opencl
 
-# Below this share of the field's rms the direction of L is noise; the frame turns to the fallback smoothly.
+# Below this share of the field's rms the direction of L is noise; the axes go over to the fallback smoothly.
 STILL = 1e-3
 X_AXIS = np.array([1, 0], np.float32)
 # The second direction lives on a lattice of about this many cells along the longest side: at every level of a
@@ -33,28 +33,27 @@ FAR = 1e-6
 def axes_2d(L: np.ndarray, along: str = "x") -> np.ndarray:
     """The local x axis of the exemplar in each cell of L (Y, X, 2): unit vectors (Y, X, 2) float32.
 
-    In 2D the frame is completely defined by L: the x axis follows it and the y axis stands 90 degrees on (§3.3).
-    With along = "y" the y axis follows it, so that upright motifs rise upright. Where L rests the frame falls back
-    on the axes of the domain.
+    The x axis follows L and the y axis is 90 degrees counter-clockwise from it (§3.3). With along = "y" the y axis
+    follows L, so that upright motifs stay upright. Where L rests the axes fall back to those of the domain.
     """
     L = L if along == "x" else np.stack([L[..., 1], -L[..., 0]], axis=-1)
     rms = float(np.sqrt(np.mean(np.sum(L.astype(np.float64) ** 2, axis=-1))))
     if rms == 0.0:
         return np.broadcast_to(X_AXIS, L.shape).copy()
-    frame = L / rms + np.float32(STILL) * X_AXIS
-    length = np.linalg.norm(frame, axis=-1, keepdims=True)
-    return np.where(length > 1e-12, frame / np.maximum(length, 1e-12), X_AXIS).astype(np.float32)
+    axes = L / rms + np.float32(STILL) * X_AXIS
+    length = np.linalg.norm(axes, axis=-1, keepdims=True)
+    return np.where(length > 1e-12, axes / np.maximum(length, 1e-12), X_AXIS).astype(np.float32)
 
 
 def axes_3d(L: np.ndarray, towards: np.ndarray, along: str = "x") -> np.ndarray:
-    """Local frames of L (Z, Y, X, 3): rotations R (Z, Y, X, 3, 3) float32, R[..., :, k] the local axis k (§3.3).
+    """Local axes of L (Z, Y, X, 3): rotations R (Z, Y, X, 3, 3) float32, R[..., :, k] the local axis k (§3.3).
 
     along    the axis, "x" or "y", that follows L
-    towards  (Z, Y, X, 3), any unit, longer where it is surer: axis 2 is its part across L
-    Continuous where L rests, where it falls back on the domain's axes, and where `towards` vanishes or runs along L,
-    where it follows what lies around. What no rule can avoid are points round which L points everywhere, and lines
-    round which the part across L winds: there the frame turns over from one voxel to the next (in a plume at one pair
-    of neighbours in a thousand).
+    towards  (Z, Y, X, 3), any unit, longer where it is more certain: axis 2 is its part across L
+    Continuous where L rests (the axes fall back to the domain's) and where `towards` vanishes or runs along L (they
+    follow the surroundings). No rule can avoid singular points, round which L takes all directions, and singular lines,
+    round which the part of `towards` across L winds: there the axes flip from one voxel to the next (in a plume at one
+    pair of neighbours in a thousand).
     """
     scale, lattice, stride = _prepared(L, towards, along)
     out = opencl.empty((*L.shape[:-1], 3, 3))
@@ -128,9 +127,9 @@ def _finer(lattice: np.ndarray, shape: tuple[int, ...], stride: int) -> np.ndarr
 def _prepared(L: np.ndarray, towards: np.ndarray, along: str) -> tuple[np.float32, np.ndarray, int]:
     """The factor that brings L to rms 1; `towards` across L on the lattice (z, y, x, 3); the lattice's stride.
 
-    It is spread to where it has no part across L: the minimum over w of sum |w - P w'|^2 + |w - P t|^2 / SPREAD^2,
-    P the projection across L, w' the six neighbours. That is linear in t and changes as smoothly as t does; only its
-    direction may turn over, where it vanishes.
+    It is spread to places where it has no part across L: the minimum over w of
+    sum |w - P w'|^2 + |w - P t|^2 / SPREAD^2, P the projection across L, w' the six neighbours. That is linear in t and
+    as smooth as t; only its direction may flip, where it vanishes.
     """
     scale, stride = _per_rms(L), _stride(L.shape[:-1])
     e = _follow(block_means(L, stride) * scale, along)
@@ -149,11 +148,11 @@ def _prepared(L: np.ndarray, towards: np.ndarray, along: str) -> tuple[np.float3
 
 
 def outward(density: np.ndarray) -> np.ndarray:
-    """The way out of the smoke, -grad of the smoothed density (Z, Y, X): (Z, Y, X, 3) float32, at most 1 long (§3.3).
+    """The direction out of the smoke, -grad of the smoothed density (Z, Y, X): (Z, Y, X, 3) float32, length up to 1.
 
-    Smoothed by a Gaussian of width s, -s^2 grad D / D is the way from the smoke's centroid, as near eyes of that
-    width see it, to the voxel: it is defined inside the body and far outside, and shrinks where it is undecided, on
-    the body's axis. Two widths are added: the near one sees the surface, the far one the body. Zero without smoke.
+    Smoothed by a Gaussian of width s, -s^2 grad D / D is the vector to the voxel from the centroid of the smoke within
+    about s (§3.3). It is defined inside the body and far outside, and short where it is ambiguous, on the body's axis.
+    Two widths are added: the narrow one follows the surface, the wide one the body. Zero without smoke.
     """
     shape = density.shape
     stride = _stride(shape)
@@ -165,16 +164,16 @@ def outward(density: np.ndarray) -> np.ndarray:
     cells = np.stack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in D.shape), indexing="ij")[::-1], -1)
     moments = D[..., None] * cells
     centroid = moments.sum((0, 1, 2), dtype=np.float64) / total
-    way = np.zeros_like(cells)
+    direction = np.zeros_like(cells)
     for width in (NARROW, WIDE):
         sigma = max(width * longest, 0.5)
         # truncated far out, so that distant smoke is still seen
         near = ndimage.gaussian_filter(D, sigma, mode="constant", truncate=4)
         around = ndimage.gaussian_filter(moments, (sigma, sigma, sigma, 0), mode="constant", truncate=4)
         far = FAR * total / D.size
-        way += cells - (around + far * centroid.astype(np.float32)) / (near + far)[..., None]
-    way /= np.linalg.norm(way, axis=-1, keepdims=True) + np.float32(NARROW * longest)
-    return _finer(way.astype(np.float32), shape, stride)
+        direction += cells - (around + far * centroid.astype(np.float32)) / (near + far)[..., None]
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True) + np.float32(NARROW * longest)
+    return _finer(direction.astype(np.float32), shape, stride)
 
 
 def interpolated_directions(at: np.ndarray, vectors: np.ndarray, shape: tuple[int, int, int]) -> np.ndarray:
@@ -206,19 +205,18 @@ def interpolated_directions(at: np.ndarray, vectors: np.ndarray, shape: tuple[in
 
 
 def largest_turn(a: np.ndarray, b: np.ndarray) -> float:
-    """The largest angle, in degrees, between rotations a and b (..., 3, 3): of one voxel to the next, or of two
-    frames."""
+    """The largest angle, in degrees, between the rotations a and b, (..., 3, 3) each."""
     trace = np.einsum("...ij,...ij->...", a, b)
     return float(np.degrees(np.arccos(np.clip((np.min(trace) - 1) / 2, -1, 1))))
 
 
-def to_world(H: np.ndarray, frame: np.ndarray) -> np.ndarray:
+def to_world(H: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """H' = R H: detail from exemplar coordinates to those of the domain (§3.1, CoordinateTransform).
 
     H (Y, X, 2) with the local x axes (Y, X, 2), or H (Z, Y, X, 3) with rotations (Z, Y, X, 3, 3).
     """
     if H.shape[-1] == 3:
-        return np.einsum("...ij,...j->...i", frame, H)
-    x = frame[..., 0] * H[..., 0] - frame[..., 1] * H[..., 1]
-    y = frame[..., 1] * H[..., 0] + frame[..., 0] * H[..., 1]
+        return np.einsum("...ij,...j->...i", axes, H)
+    x = axes[..., 0] * H[..., 0] - axes[..., 1] * H[..., 1]
+    y = axes[..., 1] * H[..., 0] + axes[..., 0] * H[..., 1]
     return np.stack([x, y], axis=-1)

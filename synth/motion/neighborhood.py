@@ -1,7 +1,7 @@
-"""Neighbourhoods: where they stand, what they see, and the small space they are compared in.
+"""Neighbourhoods: where their centres are, how they are sampled, and the PCA space in which they are compared.
 
 The output is covered by a sparse grid of neighbourhoods, one every quarter of their width [Kwatra 2005 §3.2].
-Each is sampled in the local frame of the coarse motion (ma09 §3.3) and projected on the principal components
+Each is sampled along the local axes of the coarse motion (ma09 §3.3) and projected on the principal components
 of the exemplar's own neighbourhoods, where its best match is searched (ma09 §3.1).
 """
 
@@ -105,8 +105,8 @@ class Space:
     def gather(self, field: Any, sites: Any, axis: Any) -> Any:
         """Oriented neighbourhoods of field (Y, X, K) at sites (S, 2) int32, their x axes along axis (S, 2).
 
-        Device arrays in, device array (S, C) out, as `gather_reference`; rows are added to make them a multiple
-        of SITES_TOGETHER, and hold nothing of meaning.
+        Device arrays in, device array (S, C) out, as `gather_reference`; rows of padding make their number a
+        multiple of SITES_TOGETHER.
         """
         count = sites.shape[0]
         patches = opencl.empty((-(-count // SITES_TOGETHER) * SITES_TOGETHER, self.length))
@@ -148,8 +148,8 @@ def _scatter(exemplar: np.ndarray, radius: int) -> np.ndarray:
     spectrum = np.fft.rfft2(exemplar - exemplar.mean(axis=(0, 1), dtype=np.float64), axes=(0, 1))
     correlation = np.fft.irfft2(spectrum.conj()[..., :, None] * spectrum[..., None, :], (rows, columns), axes=(0, 1))
     span = np.arange(2 * radius + 1)
-    way = span - span[:, None]
-    pairs = correlation[(way % rows)[:, None, :, None], (way % columns)[None, :, None, :]]  # iy, ix, jy, jx, k, l
+    lag = span - span[:, None]
+    pairs = correlation[(lag % rows)[:, None, :, None], (lag % columns)[None, :, None, :]]  # iy, ix, jy, jx, k, l
     length = len(span) ** 2 * channels
     return np.ascontiguousarray(pairs.transpose(0, 1, 4, 2, 3, 5)).reshape(length, length)
 

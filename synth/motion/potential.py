@@ -1,8 +1,8 @@
-"""Potential synthesis in the plane (ma09 §3.6, "Discussion"): the stream function ψ is synthesized, not the motion.
+"""Potential synthesis in 2-D (ma09 §3.6, "Discussion"): the stream function ψ is synthesized, not the motion.
 
-The exemplar's ψ is a scalar, synthesized like a texture of one channel: only its neighbourhoods are turned by the
-local frame, its values need no coordinate transformation. H' = curl ψ has no divergence, by construction, whatever the
-frames do, and ψ ramped down to zero at a wall lets nothing through it [Bridson et al. 2007, §2.4]. What that costs:
+The exemplar's ψ is a scalar, synthesized like a texture of one channel: only its neighbourhoods are rotated by the
+local axes, its values need no coordinate transformation. H' = curl ψ has no divergence by construction, whatever the
+axes do, and ψ ramped down to zero at a wall lets nothing through it [Bridson et al. 2007, §2.4]. What that costs:
 a match weighs by the size of ψ, so wide features count for more and edges for less; and where matches disagree, the
 seam in ψ becomes a jet along it.
 
@@ -78,9 +78,9 @@ class Synthesis(detail.Synthesis):
             self.open = np.maximum(ramp((np.pad(distance, MARGIN, mode="edge") - 1) / WALL), 0)[..., None]
 
     def visible(self, state: State) -> np.ndarray:
-        """H (Y, X, 2) of a state, without its margin: curl ψ, turned back from the domain to the local frame."""
+        """H (Y, X, 2) of a state, without its margin: curl ψ, rotated back from the domain to the local axes."""
         inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
         psi = state.H[-1] if self.open is None else state.H[-1] * self.open
-        world, e = curl(psi)[inside].astype(np.float32), state.frame[-1][inside]
+        world, e = curl(psi)[inside].astype(np.float32), state.axes[-1][inside]
         return np.stack([e[..., 0] * world[..., 0] + e[..., 1] * world[..., 1],
                          e[..., 0] * world[..., 1] - e[..., 1] * world[..., 0]], axis=-1)

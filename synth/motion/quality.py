@@ -1,4 +1,4 @@
-"""How good a synthesized detail field is: five numbers that blur and emptiness cannot please, and whole motifs.
+"""How good a synthesized detail field is: five numbers, none of which a blurred or empty field can reach; whole motifs.
 
 All on H before the coordinate transformation, neighbourhoods oriented as in the search (ma09 §3.3), the exemplar
 toroidal. Distances are rms over the neighbourhood, divided by the rms of the exemplar.
@@ -17,9 +17,9 @@ from synth.motion.search import Matcher
 from synth.motion.views import View, ViewSearch, on_device, site_grid
 
 RADIUS = 4
-# an exemplar neighbourhood weaker than this share of the exemplar's rms shows nothing that could be missed
+# exemplar neighbourhoods weaker than this share of the exemplar's rms do not count for `used`
 FAINT = 0.05
-# neighbourhoods that agree to this share of the exemplar's rms are one
+# neighbourhoods that agree to this share of the exemplar's rms count as the same
 SAME = 1e-3
 # what a cell of a motif must have of the exemplar's largest magnitude
 SUPPORT = 0.2
@@ -53,7 +53,7 @@ def _gradient(field: np.ndarray, toroidal: bool) -> float:
 def _identical(patches: np.ndarray, step: float) -> np.ndarray:
     """A number for each of patches (E, C), equal where they agree to `step`: (E,) int.
 
-    Along a stripe all neighbourhoods are one and the same, and which of them is called nearest means nothing.
+    Along a stripe all neighbourhoods are the same, and which of them is found nearest is arbitrary.
     """
     rounded = np.ascontiguousarray(np.rint(patches / step).astype(np.int32))
     rows = rounded.view(np.dtype((np.void, rounded.dtype.itemsize * rounded.shape[1])))
@@ -66,7 +66,7 @@ def _mean_distance(squared: np.ndarray, length: int) -> float:
 
 
 def _whole_space(patches: np.ndarray) -> Space:
-    """The neighbourhoods (E, C) themselves as a space, only turned so that the first dimensions vary most, by which
+    """The neighbourhoods (E, C) themselves as a space, only rotated so that the first dimensions vary most, by which
     the search can pass over many; zero columns up to a multiple of 16."""
     length = patches.shape[1]
     mean = patches.mean(axis=0)
@@ -77,8 +77,8 @@ def _whole_space(patches: np.ndarray) -> Space:
     return Space(RADIUS, mean, basis, (patches - mean) @ basis)
 
 
-def measure(H: np.ndarray, frame: np.ndarray, exemplar: np.ndarray) -> Quality:
-    """The five numbers of H (Y, X, 2) with local frames (Y, X, 2) against exemplar (N, M, 2), 9² neighbourhoods.
+def measure(H: np.ndarray, axes: np.ndarray, exemplar: np.ndarray) -> Quality:
+    """The five numbers of H (Y, X, 2) with local axes (Y, X, 2) against exemplar (N, M, 2), 9² neighbourhoods.
 
     Output neighbourhoods are those that lie wholly inside H. Raises ValueError where H is too small to hold one.
     """
@@ -90,7 +90,7 @@ def measure(H: np.ndarray, frame: np.ndarray, exemplar: np.ndarray) -> Quality:
     ours = exemplar_patches(exemplar, RADIUS)
     whole = _whole_space(ours)
     theirs = whole.project(opencl.to_device(H), opencl.to_device(sites),
-                           opencl.to_device(frame[sites[:, 1], sites[:, 0]]))
+                           opencl.to_device(axes[sites[:, 1], sites[:, 0]]))
     best, forward = Matcher(whole, exemplar.shape[:2], 1).exact(theirs)
     seen = Space(RADIUS, whole.mean, whole.basis, theirs.get())
     _, backward = Matcher(seen, H.shape[:2], 1).exact(opencl.to_device(whole.points))
@@ -105,22 +105,22 @@ def measure(H: np.ndarray, frame: np.ndarray, exemplar: np.ndarray) -> Quality:
                    _gradient(H, False) / max(_gradient(exemplar, True), 1e-12))
 
 
-def measure_view(H: np.ndarray, frame: np.ndarray, view: View) -> Quality:
-    """The five numbers of H (Z, Y, X, 3), local coordinates, as one view sees it; frame (Z, Y, X, 3, 3).
+def measure_view(H: np.ndarray, axes: np.ndarray, view: View) -> Quality:
+    """The five numbers of H (Z, Y, X, 3), local coordinates, as one view sees it; axes (Z, Y, X, 3, 3).
 
     9² neighbourhoods on every second cell, in the space of the exemplar's own; the gradients are along right and up.
     """
     width = 2 * RADIUS + 1
-    eye = ViewSearch(view, view.exemplar, view.projection.T, width)
+    search = ViewSearch(view, view.exemplar, view.projection.T, width)
     inset = int(np.ceil(RADIUS * np.sqrt(3)))
     if min(H.shape[:3]) <= 2 * inset:
         raise ValueError(f"a field of {H.shape[2]} x {H.shape[1]} x {H.shape[0]} cells holds no neighbourhood of 9³")
-    local = frame[site_grid(H.shape[:3], width)]
+    local = axes[site_grid(H.shape[:3], width)]
     whole = np.zeros(local.shape[:3], bool)
     whole[(slice(inset // 2, -(inset // 2)),) * 3] = True
-    queries = eye.queries(on_device(H), eye.legs(local), local.shape[:3], 0, whole.size).get()[whole.ravel()]
-    space, length = eye.matcher.space, eye.matcher.space.length
-    best, forward = eye.matcher.exact(opencl.to_device(queries))
+    queries = search.queries(on_device(H), search.basis_at(local), local.shape[:3], 0, whole.size).get()[whole.ravel()]
+    space, length = search.matcher.space, search.matcher.space.length
+    best, forward = search.matcher.exact(opencl.to_device(queries))
     theirs = Space(RADIUS, space.mean, space.basis, queries)
     _, backward = Matcher(theirs, (1, len(queries)), 1).exact(opencl.to_device(space.points))
     rms = max(_rms(view.exemplar), 1e-12)
@@ -128,7 +128,7 @@ def measure_view(H: np.ndarray, frame: np.ndarray, view: View) -> Quality:
     visible = np.sqrt(np.mean(patches.astype(np.float64) ** 2, axis=1)) > FAINT * rms
     same = _identical(patches, SAME * rms)
     seen = H @ view.projection.T.astype(np.float32)
-    slopes = np.stack(np.gradient(seen, axis=(2, 1, 0)), -1) @ (frame @ view.legs[:2].T.astype(np.float32))
+    slopes = np.stack(np.gradient(seen, axis=(2, 1, 0)), -1) @ (axes @ view.basis[:2].T.astype(np.float32))
     continued = np.pad(view.exemplar, ((1, 1), (1, 1), (0, 0)), mode="wrap")
     ours = np.stack(np.gradient(continued, axis=(1, 0)), -1)[1:-1, 1:-1]
 
@@ -141,7 +141,7 @@ def measure_view(H: np.ndarray, frame: np.ndarray, view: View) -> Quality:
 
 
 def oriented(H: np.ndarray, at: np.ndarray, e: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Windows of H (Y, X, 2) round positions at (K, 2) as x, y, turned by e (K, 2): (K, rows, columns, 2)."""
+    """Windows of H (Y, X, 2) round positions at (K, 2) as x, y, rotated by e (K, 2): (K, rows, columns, 2)."""
     j, i = np.meshgrid(*(np.arange(n) - (n - 1) / 2 for n in size), indexing="ij")
     x = at[:, 0, None, None] + e[:, 0, None, None] * i - e[:, 1, None, None] * j
     y = at[:, 1, None, None] + e[:, 1, None, None] * i + e[:, 0, None, None] * j
@@ -151,7 +151,7 @@ def oriented(H: np.ndarray, at: np.ndarray, e: np.ndarray, size: tuple[int, int]
 def motif(exemplar: np.ndarray) -> np.ndarray:
     """The bounding box of a closed motif in its exemplar (N, N, 2): (rows, columns, 2).
 
-    Raises ValueError if the exemplar is no single motif on an empty ground.
+    Raises ValueError if the exemplar is not a single motif on an empty background.
     """
     support = np.linalg.norm(exemplar, axis=-1) > SUPPORT / 4 * np.linalg.norm(exemplar, axis=-1).max()
     if support[[0, -1]].any() or support[:, [0, -1]].any():
@@ -160,11 +160,11 @@ def motif(exemplar: np.ndarray) -> np.ndarray:
     return exemplar[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1]
 
 
-def whole_motifs(H: np.ndarray, frame: np.ndarray, exemplar: np.ndarray) -> tuple[int, int]:
+def whole_motifs(H: np.ndarray, axes: np.ndarray, exemplar: np.ndarray) -> tuple[int, int]:
     """(whole, all): motifs of H (Y, X, 2) not cut by the border, and those of them that are whole.
 
     A connected piece of H counts as its area over the motif's, rounded, and as one at least; a motif is whole
-    where some place in the piece correlates >= 0.8 with the exemplar's motif in its local frame.
+    where some place in the piece correlates >= 0.8 with the exemplar's motif in its local axes.
     """
     template = motif(exemplar)
     strong = SUPPORT * np.linalg.norm(exemplar, axis=-1).max()
@@ -182,16 +182,16 @@ def whole_motifs(H: np.ndarray, frame: np.ndarray, exemplar: np.ndarray) -> tupl
             continue
         expected = max(1, round(cells / area))
         total += expected
-        whole += min(expected, _peaks(H, frame, template, box))
+        whole += min(expected, _peaks(H, axes, template, box))
     return whole, total
 
 
-def _peaks(H: np.ndarray, frame: np.ndarray, template: np.ndarray, box: tuple[slice, ...]) -> int:
+def _peaks(H: np.ndarray, axes: np.ndarray, template: np.ndarray, box: tuple[slice, ...]) -> int:
     """How many separate places in a box of H correlate with the template to WHOLE or more."""
     step = max(1, min(template.shape[:2]) // 24)
     ys, xs = (grid.ravel() for grid in np.mgrid[box[0].start:box[0].stop:step, box[1].start:box[1].stop:step])
     at = np.stack([xs, ys], axis=-1).astype(float)
-    windows = oriented(H, at, frame[ys, xs], template.shape[:2]).reshape(len(at), -1)
+    windows = oriented(H, at, axes[ys, xs], template.shape[:2]).reshape(len(at), -1)
     norm = np.linalg.norm(windows, axis=1) * np.linalg.norm(template)
     correlation = windows @ template.reshape(-1) / np.maximum(norm, 1e-12)
     found: list[np.ndarray] = []

@@ -147,7 +147,7 @@ inline int wrapped(int x, int y, int2 exemplar) {
 }
 
 // k-coherence [Tong 2002; Han 2006]: the candidates of a site are the k most similar neighbourhoods of what
-// its 3 x 3 neighbouring sites matched, each shifted by the way from that site in this one's local frame.
+// its 3 x 3 neighbouring sites matched, each shifted by the offset from that site along this one's local axes.
 // points (N * M, DIMS); similar (N * M, K), each row beginning with itself; match (count) of the last search
 __kernel void coherent(__global const float *points, __global const int *similar, int2 exemplar,
                        __global const float *queries, __global const int2 *sites, __global const float2 *axis,
@@ -161,9 +161,9 @@ __kernel void coherent(__global const float *points, __global const int *similar
             const int nx = gx + dx, ny = gy + dy;
             if (nx < 0 || ny < 0 || nx >= grid.x || ny >= grid.y) continue;
             const int n = ny * grid.x + nx;
-            const float2 way = convert_float2(sites[s] - sites[n]);
-            const int i = convert_int_rte(e.x * way.x + e.y * way.y);
-            const int j = convert_int_rte(e.x * way.y - e.y * way.x);
+            const float2 offset = convert_float2(sites[s] - sites[n]);
+            const int i = convert_int_rte(e.x * offset.x + e.y * offset.y);
+            const int j = convert_int_rte(e.x * offset.y - e.y * offset.x);
             const int centre = wrapped(match[n] % exemplar.x + i, match[n] / exemplar.x + j, exemplar);
             for (int k = 0; k < CANDIDATES; k++) {
                 const int candidate = similar[centre * CANDIDATES + k];

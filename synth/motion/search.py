@@ -1,6 +1,7 @@
 """Search (ma09 §3.1 and §3.7): the best match of each output neighbourhood among the exemplar's own.
 
-Exact search compares with all that a bound cannot rule out; k-coherence only with what the neighbouring sites suggest.
+Exact search compares with every neighbourhood that a bound cannot exclude; k-coherence only with those that the
+neighbouring sites suggest.
 """
 
 from __future__ import annotations
@@ -42,9 +43,9 @@ def coherent_reference(points: np.ndarray, similar: np.ndarray, exemplar: tuple[
         candidates: set[int] = set()
         for n in (y * columns + x for y in range(max(gy - 1, 0), min(gy + 2, rows))
                   for x in range(max(gx - 1, 0), min(gx + 2, columns))):
-            way = (sites[s] - sites[n]).astype(np.float32)
-            i = int(np.rint(axis[s, 0] * way[0] + axis[s, 1] * way[1]))
-            j = int(np.rint(axis[s, 0] * way[1] - axis[s, 1] * way[0]))
+            offset = (sites[s] - sites[n]).astype(np.float32)
+            i = int(np.rint(axis[s, 0] * offset[0] + axis[s, 1] * offset[1]))
+            j = int(np.rint(axis[s, 0] * offset[1] - axis[s, 1] * offset[0]))
             y, x = divmod(int(match[n]), exemplar[1])
             candidates.update(similar[(y + j) % exemplar[0] * exemplar[1] + (x + i) % exemplar[1]].tolist())
         choice = np.array(sorted(candidates))
@@ -117,7 +118,7 @@ class Matcher:
         return np.array(self.exemplar[::-1], np.int32)
 
     def prepare(self) -> None:
-        """Bring to the device now what `exact` else brings when first called."""
+        """Upload now what `exact` would upload at its first call."""
         _ = self._blocks
 
     def exact(self, queries: Any) -> tuple[Any, Any]:

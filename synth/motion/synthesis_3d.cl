@@ -13,7 +13,7 @@ inline float4 catmull_rom(float t) {
 }
 
 // The frame before, carried by the flow: displacement (Z, Y, X, 3) to where each cell's content comes from.
-__kernel void carry_solid(__global const float4 *field, __global const float *displacement, __global float4 *out) {
+__kernel void carry_3d(__global const float4 *field, __global const float *displacement, __global float4 *out) {
     const int x = get_global_id(0), y = get_global_id(1), z = get_global_id(2);
     const int4 size = (int4)(get_global_size(0), get_global_size(1), get_global_size(2), 1);
     const int here = (z * size.y + y) * size.x + x;

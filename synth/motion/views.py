@@ -1,7 +1,7 @@
-"""Views: how an exemplar looks at a 3-D field, and the search for its matches (ma09 §3.2, figure 3, pseudocode 2).
+"""Views: how a 2-D exemplar is seen in a 3-D field, and the search from a view (ma09 §3.2, figure 3, pseudocode 2).
 
-A view sees a plane of the local axes; neighbourhoods are projected on it before the match, and a match
-contributes only what the view can see (Eq. 2, figure 3).
+A view is a plane in local coordinates. Neighbourhoods are projected on it before the search, and a match contributes
+only the components in that plane (Eq. 2, figure 3).
 
     I_i  exemplar of view i     P_i  its projection, the rows right and up      w_i  its weight
     mu   match of a site        R    local axes                                 M_i  what its match makes of a voxel
@@ -35,10 +35,10 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class View:
-    """One exemplar and how it looks at the local frame.
+    """One exemplar and the plane of the local axes in which it is seen.
 
-    exemplar  (N, M, 2) float32, a field of the plane; or (K, N, M, 3), a volume's (3D to 3D)
-    right, up directions of the exemplar's x and y axis in the local frame, made unit and perpendicular
+    exemplar  (N, M, 2) float32, a 2-D field; or (K, N, M, 3), a volume (3D to 3D)
+    right, up directions of the exemplar's x and y axis in local coordinates, made unit and perpendicular
     weight    how much its matches count against those of other views, per unit
     Raises ValueError for directions that are parallel or zero, a weight that is not positive, an exemplar of
     another shape or without motion.
@@ -62,8 +62,8 @@ class View:
             raise ValueError(f"a view's right {self.right} and up {self.up} span no plane")
 
     @property
-    def legs(self) -> np.ndarray:
-        """Right, up and normal in the local frame: (3, 3) float64, orthonormal rows."""
+    def basis(self) -> np.ndarray:
+        """Right, up and normal in local coordinates: (3, 3) float64, orthonormal rows."""
         right = np.array(self.right, float) / np.linalg.norm(self.right)
         up = np.array(self.up, float)
         up = up - (up @ right) * right
@@ -78,7 +78,7 @@ class View:
     @property
     def projection(self) -> np.ndarray:
         """P: (2, 3) right and up; of a volume (3, 3), right, up and normal."""
-        return self.legs[: self.dimension]
+        return self.basis[: self.dimension]
 
 
 def contributions(views: Sequence[View]) -> list[np.ndarray]:
@@ -90,8 +90,8 @@ def contributions(views: Sequence[View]) -> list[np.ndarray]:
     seen = sum((v.weight * v.projection.T @ v.projection for v in views), np.zeros((3, 3)))
     values, directions = np.linalg.eigh(seen)
     if values[0] < FLAT * values[-1] * min(v.weight for v in views) / max(v.weight for v in views):
-        way = ", ".join(f"{c:.2g}" for c in directions[:, 0])
-        raise ValueError(f"the views do not span space: none sees the direction ({way}) of the local frame")
+        direction = ", ".join(f"{c:.2g}" for c in directions[:, 0])
+        raise ValueError(f"the views do not span space: none sees the direction ({direction}) of the local axes")
     return [np.linalg.solve(seen, v.weight * v.projection.T) for v in views]
 
 
@@ -118,7 +118,14 @@ def site_grid(shape: tuple[int, ...], width: int) -> tuple[slice, ...]:
 
 @dataclass(frozen=True)
 class ViewSearch:
-    """One view at one level with one width of neighbourhoods: it searches and lays down."""
+    """Search and assignment for one view, at one level, with one width of neighbourhoods.
+
+    view, exemplar  the view, and its exemplar at this level
+    matrix          M_i, see `contributions`
+    width           of the neighbourhoods, cells
+    dominant        whether this view weighs more than all others together
+    k               candidates that each neighbour offers in k-coherence
+    """
 
     view: View
     exemplar: np.ndarray
@@ -131,7 +138,7 @@ class ViewSearch:
     def slab(self) -> np.float32:
         """How far a match reaches to the front and to the back of its plane, cells.
 
-        Where one view dominates nothing else would hold its motifs together across its planes.
+        If the view is dominant this is half the neighbourhood, since no other view connects its motifs across planes.
         """
         return np.float32(self.width // 2 if self.dominant else neighborhood.spacing(self.width))
 
@@ -158,8 +165,8 @@ class ViewSearch:
 
     @property
     def _border(self) -> int:
-        # a match's offset reaches the corner of its foot or of the eight sites' cube, its position half a cell beyond;
-        # Catmull-Rom two more
+        # a match's offset reaches the corner of its footprint or of the cube of eight sites, its position half a cell
+        # beyond, Catmull-Rom two more
         return int(np.ceil(np.sqrt(3) * neighborhood.spacing(self.width))) + 4
 
     @cached_property
@@ -173,37 +180,37 @@ class ViewSearch:
         return opencl.to_device(padded), np.array([padded.shape[1], padded.shape[0], 1, 1], np.int32)
 
     @cached_property
-    def _basis(self) -> tuple[np.ndarray, ...]:
+    def _columns(self) -> tuple[np.ndarray, ...]:
         """right, up, and the columns of M_i, for the kernels."""
-        right, up = (np.array([*leg, 0], np.float32) for leg in self.view.legs[:2])
+        right, up = (np.array([*row, 0], np.float32) for row in self.view.basis[:2])
         columns = np.zeros((3, 4), np.float32)
         columns[: self.matrix.shape[1], :3] = self.matrix.T
         return right, up, *columns
 
-    def legs(self, frame: np.ndarray) -> Any:
-        """Right, up and normal in the domain at each site, for local frames (K, J, I, 3, 3): device (S, 3, 4)."""
-        legs = np.zeros((frame[..., 0, 0].size, 3, 4), np.float32)
-        legs[..., :3] = np.einsum("lk,sdk->sld", self.view.legs.astype(np.float32), frame.reshape(-1, 3, 3))
-        return opencl.to_device(legs)
+    def basis_at(self, axes: np.ndarray) -> Any:
+        """Right, up and normal in the domain at each site, for local axes (K, J, I, 3, 3): device (S, 3, 4)."""
+        basis = np.zeros((axes[..., 0, 0].size, 3, 4), np.float32)
+        basis[..., :3] = np.einsum("lk,sdk->sld", self.view.basis.astype(np.float32), axes.reshape(-1, 3, 3))
+        return opencl.to_device(basis)
 
-    def queries(self, field: Any, legs: Any, grid: tuple[int, ...], first: int, count: int) -> Any:
+    def queries(self, field: Any, basis: Any, grid: tuple[int, ...], first: int, count: int) -> Any:
         """Neighbourhoods of `count` sites from `first` on, as the view sees them (§3.2, Project): (count, D).
 
-        field (Z, Y, X, 4), legs as `legs` gives them, grid (K, J, I) of sites.
+        field (Z, Y, X, 4), basis as from `basis_at`, grid (K, J, I) of sites.
         """
         rows = -(-count // neighborhood.SITES_TOGETHER) * neighborhood.SITES_TOGETHER
         patches = opencl.empty((rows, self.matcher.space.length))
         self._program(True).gather(
-            (count,), (1,), field, np.array([*field.shape[2::-1], 1], np.int32), legs,
-            np.array([*grid[::-1], 1], np.int32), np.int32(first), *self._basis[:2], self.slab, patches)
+            (count,), (1,), field, np.array([*field.shape[2::-1], 1], np.int32), basis,
+            np.array([*grid[::-1], 1], np.int32), np.int32(first), *self._columns[:2], self.slab, patches)
         return self.matcher.space.compare(patches, count)
 
-    def search(self, field: Any, legs: Any, grid: tuple[int, ...], match: Any) -> tuple[Any, Any, Any]:
+    def search(self, field: Any, basis: Any, grid: tuple[int, ...], match: Any) -> tuple[Any, Any, Any]:
         """Matches of all sites: device index (S,), position in the exemplar (S, 2 or 4), squared distance (S,).
 
         match (S,) of the last search, for k-coherence; None: exact.
         """
-        count = legs.shape[0]
+        count = basis.shape[0]
         best, distance = opencl.empty(count, np.int32), opencl.empty(count)
         positions = []
         cells = np.array([*grid[::-1], 1], np.int32)
@@ -211,12 +218,12 @@ class ViewSearch:
         program = self._program(True)
         for first in range(0, count, SITES_AT_ONCE):
             some = min(SITES_AT_ONCE, count - first)
-            queries = self.queries(field, legs, grid, first, some)
+            queries = self.queries(field, basis, grid, first, some)
             if match is None:
                 best[first:first + some], distance[first:first + some] = self.matcher.exact(queries)
             else:
-                program.coherent_solid((some,), (1,), self.matcher.points, self.matcher.similar, exemplar, queries,
-                                       legs, cells, np.int32(first), match, best, distance)
+                program.coherent_3d((some,), (1,), self.matcher.points, self.matcher.similar, exemplar, queries,
+                                       basis, cells, np.int32(first), match, best, distance)
             if self.view.dimension == 2:
                 positions.append(self.matcher.refine(queries, best[first:first + some].copy()))
         if self.view.dimension == 2:
@@ -226,18 +233,18 @@ class ViewSearch:
         place = np.stack([index % x, index // x % y, index // (x * y), np.zeros_like(index)], -1)
         return best, opencl.to_device(place.astype(np.float32)), distance
 
-    def average(self, position: Any, weight: Any, legs: Any, grid: tuple[int, ...], field: Any, out: Any, eight: bool,
+    def average(self, position: Any, weight: Any, basis: Any, grid: tuple[int, ...], field: Any, out: Any, eight: bool,
                 begin: bool) -> None:
-        """Eq. 2: adds to `out` (Z, Y, X, 4) what this view says; `begin`: the first to do so."""
+        """Eq. 2: add this view's contribution to `out` (Z, Y, X, 4); with `begin`, overwrite it."""
         self._program(eight).average(
-            field.shape[2::-1], None, *self._continued, position, weight, legs, np.array([*grid[::-1], 1], np.int32),
-            *self._basis, self.slab, np.int32(begin), field, out)
+            field.shape[2::-1], None, *self._continued, position, weight, basis, np.array([*grid[::-1], 1], np.int32),
+            *self._columns, self.slab, np.int32(begin), field, out)
 
-    def nearest(self, position: Any, legs: Any, grid: tuple[int, ...], average: Any, out: Any, begin: bool) -> None:
-        """Pseudocode 2, Assign: adds to `out` the match, as this view sees it, that is nearest to the average."""
+    def nearest(self, position: Any, basis: Any, grid: tuple[int, ...], average: Any, out: Any, begin: bool) -> None:
+        """Pseudocode 2, Assign: the same with, in each cell, the match that is nearest to the average."""
         self._program(True).nearest(
-            average.shape[2::-1], None, *self._continued, position, legs, np.array([*grid[::-1], 1], np.int32),
-            *self._basis, np.int32(begin), average, out)
+            average.shape[2::-1], None, *self._continued, position, basis, np.array([*grid[::-1], 1], np.int32),
+            *self._columns, np.int32(begin), average, out)
 
 
 def _joined(parts: list[Any]) -> Any:
@@ -259,19 +266,19 @@ def on_device(H: np.ndarray) -> Any:
     return opencl.to_device(padded)
 
 
-# The specification of the kernels, in NumPy. Sites are given by their cells (S, 3) as x, y, z; legs are (S, 3, 3).
+# The specification of the kernels, in NumPy. Sites are cells (S, 3) as x, y, z; basis is (S, 3, 3).
 
 
-def gather_reference(field: np.ndarray, sites: np.ndarray, legs: np.ndarray, view: View, radius: int,
+def gather_reference(field: np.ndarray, sites: np.ndarray, basis: np.ndarray, view: View, radius: int,
                      slab: float, spacing: int) -> np.ndarray:
     """Specification of `gather`: field (Z, Y, X, 3) as the view sees it round each site, (S, C) float32."""
     span = np.arange(-radius, radius + 1)
-    ways = np.stack(np.meshgrid(*[span] * view.dimension, indexing="ij")[::-1], -1).reshape(-1, view.dimension)
-    at = sites[:, None] + np.einsum("pl,sld->spd", ways, legs[:, : view.dimension])
+    offsets = np.stack(np.meshgrid(*[span] * view.dimension, indexing="ij")[::-1], -1).reshape(-1, view.dimension)
+    at = sites[:, None] + np.einsum("pl,sld->spd", offsets, basis[:, : view.dimension])
     planes = [0.0]
     if view.dimension == 2 and slab > spacing:
         planes = [0.0, 0.5 * slab, -0.5 * slab]
-    seen = sum(_sampled(field, at + plane * legs[:, None, 2]) for plane in planes) / len(planes)
+    seen = sum(_sampled(field, at + plane * basis[:, None, 2]) for plane in planes) / len(planes)
     return (seen @ view.projection.T).reshape(len(sites), -1).astype(np.float32)
 
 
@@ -282,9 +289,9 @@ def _sampled(field: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def coherent_reference(points: np.ndarray, similar: np.ndarray, exemplar: tuple[int, ...], queries: np.ndarray,
-                       sites: np.ndarray, legs: np.ndarray, grid: tuple[int, int, int],
+                       sites: np.ndarray, basis: np.ndarray, grid: tuple[int, int, int],
                        match: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Specification of `coherent_solid`; exemplar (rows, columns) or (layers, rows, columns), grid (K, J, I)."""
+    """Specification of `coherent_3d`; exemplar (rows, columns) or (layers, rows, columns), grid (K, J, I)."""
     best, distance = np.zeros(len(sites), int), np.zeros(len(sites))
     for s in range(len(sites)):
         here = np.array(np.unravel_index(s, grid))
@@ -294,8 +301,8 @@ def coherent_reference(points: np.ndarray, similar: np.ndarray, exemplar: tuple[
             if (there < 0).any() or (there >= grid).any():
                 continue
             n = int(np.ravel_multi_index(tuple(there), grid))
-            way = np.rint(legs[s] @ (sites[s] - sites[n]))[: len(exemplar)].astype(int)
-            cell = (np.array(np.unravel_index(int(match[n]), exemplar)) + way[::-1]) % exemplar
+            offset = np.rint(basis[s] @ (sites[s] - sites[n]))[: len(exemplar)].astype(int)
+            cell = (np.array(np.unravel_index(int(match[n]), exemplar)) + offset[::-1]) % exemplar
             candidates.update(similar[np.ravel_multi_index(tuple(cell), exemplar)].tolist())
         choice = np.array(sorted(candidates))
         squared = ((queries[s] - points[choice]).astype(np.float64) ** 2).sum(1)
@@ -304,25 +311,25 @@ def coherent_reference(points: np.ndarray, similar: np.ndarray, exemplar: tuple[
 
 
 def shown_reference(exemplar: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """What an exemplar holds at points (P, 2 or 3), toroidal: Catmull-Rom of a picture, linear of a volume."""
+    """The exemplar at points (P, 2 or 3), toroidal: Catmull-Rom in 2-D, linear in a volume."""
     if exemplar.ndim == 3:
         return sample_reference(exemplar, at[:, :2], toroidal=True)
     return np.stack([ndimage.map_coordinates(exemplar[..., c], at.T[::-1], order=1, mode="grid-wrap")
                      for c in range(3)], -1)
 
 
-def average_reference(search: ViewSearch, position: np.ndarray, weight: np.ndarray, sites: np.ndarray, legs: np.ndarray,
-                      field: np.ndarray, eight: bool) -> np.ndarray:
-    """Specification of `average`: what one view makes of each voxel (Z, Y, X, 3), site by site."""
+def average_reference(search: ViewSearch, position: np.ndarray, weight: np.ndarray, sites: np.ndarray,
+                      basis: np.ndarray, field: np.ndarray, eight: bool) -> np.ndarray:
+    """Specification of `average`: one view's contribution to each voxel (Z, Y, X, 3), site by site."""
     step = neighborhood.spacing(search.width)
     sums, totals = np.zeros((*field.shape[:3], search.view.dimension)), np.zeros(field.shape[:3])
-    for s, (way, o) in enumerate(_offsets(sites, legs, field.shape[:3])):
+    for s, (offset, o) in enumerate(_offsets(sites, basis, field.shape[:3])):
         share = 1 - o**2 / (step + 1) ** 2
         volume = search.view.dimension == 3
         depth = share[..., 2] if volume else 1 - np.abs(o[..., 2]) / float(search.slab)
         if eight:
             w = np.maximum(share[..., 0], 0.1) * np.maximum(share[..., 1], 0.1) * np.maximum(depth, 0.1)
-            w *= _among_eight(way, sites[s], sites, step)
+            w *= _among_eight(offset, sites[s], sites, step)
         else:
             w = share[..., 0] * share[..., 1] * depth
             w *= (np.abs(o[..., : 3 if volume else 2]).max(-1) <= step + 0.001) & (depth > 0)
@@ -336,34 +343,34 @@ def average_reference(search: ViewSearch, position: np.ndarray, weight: np.ndarr
     return (mean @ search.matrix.T).astype(np.float32)
 
 
-def nearest_reference(search: ViewSearch, position: np.ndarray, sites: np.ndarray, legs: np.ndarray,
+def nearest_reference(search: ViewSearch, position: np.ndarray, sites: np.ndarray, basis: np.ndarray,
                       average: np.ndarray) -> np.ndarray:
     """Specification of `nearest`: of the eight matches round a voxel the one most similar to the average there."""
     step, dimension = neighborhood.spacing(search.width), search.view.dimension
     mean = average @ search.view.projection.T
     best, least = np.zeros_like(mean), np.full(average.shape[:3], np.inf)
-    for s, (way, o) in enumerate(_offsets(sites, legs, average.shape[:3])):
+    for s, (offset, o) in enumerate(_offsets(sites, basis, average.shape[:3])):
         at = position[s, :dimension] + o[..., :dimension]
         shown = shown_reference(search.exemplar, at.reshape(-1, dimension)).reshape(mean.shape)
-        d = np.where(_among_eight(way, sites[s], sites, step), np.sum((shown - mean) ** 2, -1), np.inf)
+        d = np.where(_among_eight(offset, sites[s], sites, step), np.sum((shown - mean) ** 2, -1), np.inf)
         best = np.where((d < least)[..., None], shown, best)
         least = np.minimum(d, least)
     return (best @ search.matrix.T).astype(np.float32)
 
 
-def _offsets(sites: np.ndarray, legs: np.ndarray,
+def _offsets(sites: np.ndarray, basis: np.ndarray,
              shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """For each site the way (Z, Y, X, 3) from it to every cell, and the same along its legs."""
+    """For each site the offset (Z, Y, X, 3) from it to every cell, in the domain's axes and in its basis."""
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")[::-1], -1)
-    for site, leg in zip(sites, legs, strict=True):
-        yield cells - site, (cells - site) @ leg.T
+    for site, row in zip(sites, basis, strict=True):
+        yield cells - site, (cells - site) @ row.T
 
 
-def _among_eight(way: np.ndarray, site: np.ndarray, sites: np.ndarray, step: int) -> np.ndarray:
+def _among_eight(offset: np.ndarray, site: np.ndarray, sites: np.ndarray, step: int) -> np.ndarray:
     """Which cells (Z, Y, X) have this site at a corner of the cube of sites that holds them, or lie beyond the last."""
     first, last = sites.min(0), sites.max(0)
-    near = np.abs(way) < step
-    beyond = ((site == first) & (way <= 0)) | ((site == last) & (way >= 0))
+    near = np.abs(offset) < step
+    beyond = ((site == first) & (offset <= 0)) | ((site == last) & (offset >= 0))
     # a cell on a plane of sites looks forward too
-    behind = (way == -step) & (site > first)
+    behind = (offset == -step) & (site > first)
     return np.all(near | beyond | behind, axis=-1)

@@ -12,7 +12,7 @@ from synth.motion.boundary import (
     Constraint,
     Walls,
     impose_reference,
-    into_frame,
+    into_local,
     walls,
 )
 from synth.motion.detail import Settings, Synthesis, synthesize
@@ -35,7 +35,7 @@ def rotations(count, dimension):
 def test_a_normal_of_the_domain_in_the_exemplars_coordinates(dimension):
     frame, normal, x = rotations(7, dimension), drawn(7, dimension), drawn(7, dimension)
     in_world = to_world(x, frame) if dimension == 2 else np.einsum("kij,kj->ki", frame, x)
-    np.testing.assert_allclose(np.sum(into_frame(normal, frame) * x, -1), np.sum(normal * in_world, -1), atol=1e-5)
+    np.testing.assert_allclose(np.sum(into_local(normal, frame) * x, -1), np.sum(normal * in_world, -1), atol=1e-5)
 
 
 def test_it_is_the_minimum_of_the_energy():
@@ -62,7 +62,7 @@ def test_the_kernel_is_its_reference(shape):
     frame = every.reshape(*shape, *every.shape[1:])
     on_device = opencl.to_device(x)
     Constraint(near, frame).impose(on_device, opencl.to_device(hold))
-    np.testing.assert_allclose(on_device.get(), impose_reference(x, near, into_frame(normal, every[cells]), hold),
+    np.testing.assert_allclose(on_device.get(), impose_reference(x, near, into_local(normal, every[cells]), hold),
                                atol=2e-6)
 
 

@@ -100,7 +100,7 @@ def test_a_second_synthesis_resumes_from_a_state(search):
     for motion, expected in zip(L, uninterrupted, strict=True):
         afresh = Synthesis(I, (48, 48), settings, seed=5)
         if state is not None:
-            state = State([H.copy() for H in state.H], [frame.copy() for frame in state.frame])
+            state = State([H.copy() for H in state.H], [axes.copy() for axes in state.axes])
         state = afresh.frame(motion, state)
         np.testing.assert_array_equal(afresh.visible(state), expected)
 

@@ -201,7 +201,7 @@ def test_the_same_seed_gives_the_same_bits_and_a_kept_state_goes_on_alike():
     state = first.frame(L, None)
     copy = again.frame(L, None)
     np.testing.assert_array_equal(first.visible(state), again.visible(copy))
-    kept = lagrangian.State(*([a.copy() for a in getattr(copy, name)] for name in ("at", "H", "rank", "frame",
+    kept = lagrangian.State(*([a.copy() for a in getattr(copy, name)] for name in ("at", "H", "rank", "axes",
                                                                                     "number")))
     np.testing.assert_array_equal(first.visible(first.frame(L, state)),
                                   Synthesis(I, (40, 40), Settings(2), 5).visible(again.frame(L, kept)))

@@ -125,4 +125,4 @@ def test_the_same_seed_gives_the_same_bits_and_the_margin_sees_the_same_frames()
     state = first.frame(L, None)
     np.testing.assert_array_equal(first.visible(state), again.visible(again.frame(L, None)))
     margin = detail.MARGIN
-    np.testing.assert_array_equal(state.frame[-1][margin:-margin, margin:-margin], axes_2d(L))
+    np.testing.assert_array_equal(state.axes[-1][margin:-margin, margin:-margin], axes_2d(L))

@@ -24,9 +24,9 @@ def flow(shape, axis=0, towards=2):
     return L, T
 
 
-def first(ways, shape, **settings):
+def first(chosen, shape, **settings):
     settings = synthesis_3d.Settings(**({"levels": 1, "iterations": 2} | settings))
-    synthesis = synthesis_3d.Synthesis(ways, shape, settings, seed=1)
+    synthesis = synthesis_3d.Synthesis(chosen, shape, settings, seed=1)
     state = synthesis.frame(*flow(shape), None)
     return synthesis, state, synthesis.visible(state)
 
@@ -37,9 +37,9 @@ def test_a_field_the_views_agree_on_is_a_fixed_point(search):
     y = np.cos(2 * np.pi * np.arange(8) / 8).astype(np.float32)
     I = np.stack([np.broadcast_to(y[:, None], (8, 8)), np.zeros((8, 8), np.float32)], -1)
     still = np.full((8, 8, 2), 1e-6, np.float32)
-    ways = [View(I, *FRONT), View(still, *SIDE, 1e-3), View(still, *TOP, 1e-3)]
+    chosen = [View(I, *FRONT), View(still, *SIDE, 1e-3), View(still, *TOP, 1e-3)]
     settings = synthesis_3d.Settings(levels=1, iterations=2, search=search)
-    level = synthesis_3d.Synthesis(ways, (9, 32, 11), settings, 1).levels[0]
+    level = synthesis_3d.Synthesis(chosen, (9, 32, 11), settings, 1).levels[0]
     shape = (17, 40, 19)
     H = np.zeros((*shape, 3), np.float32)
     H[..., 0] = np.cos(2 * np.pi * np.arange(40) / 8)[:, None]
@@ -53,8 +53,8 @@ def test_a_field_the_views_agree_on_is_a_fixed_point(search):
 @pytest.mark.parametrize("search", ["exact", "k-coherence"])
 def test_the_same_seed_gives_the_same_bits(search):
     I = exemplar.exemplar("sinusoid", 8)
-    ways = views_of(I, FRONT, SIDE, TOP)
-    once, again = (first(ways, (7, 9, 10), search=search)[2] for _ in range(2))
+    chosen = views_of(I, FRONT, SIDE, TOP)
+    once, again = (first(chosen, (7, 9, 10), search=search)[2] for _ in range(2))
     np.testing.assert_array_equal(once, again)
     assert once.shape == (7, 9, 10, 3) and np.isfinite(once).all()
 
@@ -76,12 +76,12 @@ def test_a_rigid_flow_does_not_deform():
     # a rotation about y carries the detail and turns the frame with it
     turn = 0.01
     z, _, x = np.meshgrid(*[np.arange(9, dtype=np.float32) - 4] * 3, indexing="ij")
-    way = np.stack([-turn * z, np.zeros_like(z), turn * x], -1)
+    displacement = np.stack([-turn * z, np.zeros_like(z), turn * x], -1)
     before = np.broadcast_to(np.eye(3, dtype=np.float32), (9, 9, 9, 3, 3))
     c, s = np.cos(turn), np.sin(turn)
     after = np.broadcast_to(np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]], np.float32), before.shape)
-    assert synthesis_3d.deformation(way, before, after).max() < 1e-3
-    assert synthesis_3d.deformation(way, before, before).min() == pytest.approx(np.sqrt(2) * turn, rel=0.05)
+    assert synthesis_3d.deformation(displacement, before, after).max() < 1e-3
+    assert synthesis_3d.deformation(displacement, before, before).min() == pytest.approx(np.sqrt(2) * turn, rel=0.05)
     shear = np.stack([0.1 * z, 0 * z, 0 * z], -1)
     np.testing.assert_allclose(synthesis_3d.deformation(shear, before, before), 0.1, rtol=1e-4)
 
@@ -99,8 +99,8 @@ def test_a_volume_is_synthesized_from_a_volume():
 
 def test_motifs_do_not_die_out_under_a_dominating_view():
     I = exemplar.exemplar("heart", 16)
-    ways = views_of(I, FRONT, SIDE, TOP, weights=(1, 0.05, 0.05))
-    _, _, H = first(ways, (20, 40, 40), levels=2, neighborhoods=(17, 9), search="exact")
+    chosen = views_of(I, FRONT, SIDE, TOP, weights=(1, 0.05, 0.05))
+    _, _, H = first(chosen, (20, 40, 40), levels=2, neighborhoods=(17, 9), search="exact")
     seen = np.sqrt(np.mean(H[..., :2] ** 2))
     assert 0.75 < seen / np.sqrt(np.mean(I**2)) < 1.15
 
@@ -123,10 +123,10 @@ def test_frames_follow_each_other_and_stay_steady_under_a_constant_flow():
 
 def test_the_memory_it_says_it_needs_grows_with_the_voxels():
     I = exemplar.exemplar("sinusoid", 8)
-    ways = views_of(I, FRONT, SIDE, TOP)
-    small, large = (synthesis_3d.memory_needed(ways, (n, n, n), synthesis_3d.Settings(3)) for n in (64, 256))
+    chosen = views_of(I, FRONT, SIDE, TOP)
+    small, large = (synthesis_3d.memory_needed(chosen, (n, n, n), synthesis_3d.Settings(3)) for n in (64, 256))
     assert 20 < large / small < 64
-    assert 1e9 < synthesis_3d.memory_needed(ways, (256, 64, 256), synthesis_3d.Settings(3)) < 4e9
+    assert 1e9 < synthesis_3d.memory_needed(chosen, (256, 64, 256), synthesis_3d.Settings(3)) < 4e9
 
 
 def test_nothing_flows_through_a_wall():

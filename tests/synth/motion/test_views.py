@@ -34,10 +34,10 @@ def test_a_weighty_view_has_its_way():
 
 def test_tilted_views_agree_on_what_they_all_see():
     turned = views.View(picture(), (1, 0, 0), (0, 1, 1))
-    ways = [*views_of(picture(), FRONT, SIDE), turned]
-    matrices = views.contributions(ways)
+    chosen = [*views_of(picture(), FRONT, SIDE), turned]
+    matrices = views.contributions(chosen)
     s = np.array([0.3, -1.2, 0.7])
-    np.testing.assert_allclose(sum(m @ v.projection @ s for m, v in zip(matrices, ways, strict=True)), s)
+    np.testing.assert_allclose(sum(m @ v.projection @ s for m, v in zip(matrices, chosen, strict=True)), s)
 
 
 @pytest.mark.parametrize("planes", [(FRONT,), (FRONT, FRONT), (FRONT, ((0, 1, 0), (1, 0, 0)))])
@@ -65,7 +65,7 @@ def rotations(count, seed=3):
 
 
 class Bench:
-    """One view's search over a field whose every site has a frame of its own."""
+    """One view's search over a field whose every site has local axes of its own."""
 
     def __init__(self, dimension, shape, dominant, width=5):
         random = np.random.default_rng(7)
@@ -79,9 +79,9 @@ class Bench:
         cells = np.stack(np.meshgrid(*(np.arange(n)[s] for n, s in zip(shape, slices, strict=True)), indexing="ij"), -1)
         self.grid = cells.shape[:3]
         self.sites = cells.reshape(-1, 3)[:, ::-1]
-        frames = rotations(len(self.sites)).reshape(*self.grid, 3, 3)
-        self.legs = self.search.legs(frames)
-        self.on_host = self.legs.get()[..., :3].astype(np.float64)
+        axes = rotations(len(self.sites)).reshape(*self.grid, 3, 3)
+        self.basis = self.search.basis_at(axes)
+        self.on_host = self.basis.get()[..., :3].astype(np.float64)
         self.position = (random.random((len(self.sites), 2 * dimension - 2)) * 9 - 1).astype(np.float32)[:, :4]
         if dimension == 3:
             self.position[:, 3] = 0
@@ -96,7 +96,7 @@ SHAPES = pytest.mark.parametrize("shape", [(5, 7, 3), (2, 2, 2), (4, 3, 9)])
 @SHAPES
 def test_gather_and_search_equal_their_references(shape, dimension, dominant):
     b = Bench(dimension, shape, dominant)
-    match, position, distance = b.search.search(views.on_device(b.field), b.legs, b.grid, None)
+    match, position, distance = b.search.search(views.on_device(b.field), b.basis, b.grid, None)
     seen = views.gather_reference(b.field, b.sites, b.on_host, b.search.view, 2, float(b.search.slab), 1)
     space = b.search.matcher.space
     queries = (seen - space.mean) @ space.basis
@@ -109,7 +109,7 @@ def test_gather_and_search_equal_their_references(shape, dimension, dominant):
         cell = np.stack([match.get() % columns, match.get() // columns], -1)
         assert np.abs(position.get() - cell).max() <= 0.5
     # and from there by k-coherence
-    found, _, distance = b.search.search(views.on_device(b.field), b.legs, b.grid, match)
+    found, _, distance = b.search.search(views.on_device(b.field), b.basis, b.grid, match)
     best, least = views.coherent_reference(space.points, b.search.matcher.similar.get(), b.search.exemplar.shape[:-1],
                                            queries.astype(np.float32), b.sites, b.on_host, b.grid, match.get())
     np.testing.assert_allclose(distance.get(), least, rtol=1e-3, atol=1e-3)
@@ -122,7 +122,7 @@ def test_gather_and_search_equal_their_references(shape, dimension, dominant):
 def test_average_equals_its_reference(shape, dimension, dominant, eight):
     b = Bench(dimension, shape, dominant)
     out = opencl.empty((*shape, 4))
-    given = (opencl.to_device(b.position), opencl.to_device(b.weight), b.legs, b.grid, views.on_device(b.field), out)
+    given = (opencl.to_device(b.position), opencl.to_device(b.weight), b.basis, b.grid, views.on_device(b.field), out)
     b.search.average(*given, eight, True)
     expected = views.average_reference(b.search, b.position, b.weight, b.sites, b.on_host, b.field, eight)
     np.testing.assert_allclose(out.get()[..., :3], expected, atol=2e-4)
@@ -136,7 +136,7 @@ def test_average_equals_its_reference(shape, dimension, dominant, eight):
 def test_nearest_equals_its_reference(shape, dimension, dominant):
     b = Bench(dimension, shape, dominant)
     out = opencl.empty((*shape, 4))
-    b.search.nearest(opencl.to_device(b.position), b.legs, b.grid, views.on_device(b.field), out, True)
+    b.search.nearest(opencl.to_device(b.position), b.basis, b.grid, views.on_device(b.field), out, True)
     expected = views.nearest_reference(b.search, b.position, b.sites, b.on_host, b.field)
     np.testing.assert_allclose(out.get()[..., :3], expected, atol=2e-4)
 
