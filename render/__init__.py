@@ -1,26 +1,26 @@
-"""Pixels: fields, densities and meshes in, pictures out. No file; one renderer, behind one door.
+"""The renderer: fields, densities and meshes in, pictures out. It reads and writes no files.
 
 In the order data passes through them:
 
-    lic       a vector field by line integral convolution and by colour
-    arrows    a vector field by arrows on such a picture
-    sheet     light through a sheet of smoke, layer by layer
-    smoke     a density as a lit sheet, as ink on paper, or as a volume
-    particles particles as foam on a river, obstacles as stones
-    surface   meshes, cameras and lamps as Mitsuba takes them
-    water     light under water: caustics, fog, shafts, sand
-    seaweed   blades under water, by path tracing
-    school     fish in a cube of water
-    noodles   threads as noodles on a plate
-    papers    sheets as paper in the air
-    beads     particles of the plane as beads on paper, past obstacles
-    studio    what a volume is photographed in: camera, lights, backdrop, bowl
-    backend   the one home of Mitsuba and Dr.Jit
-    march     light carried through a volume without noise: the picture of an animation
-    denoise   path-traced smoke without its noise
-    film      linear light to display values to eight bits
-    layout    panels, labels, insets and legends as one figure
+    lic             vector fields by line integral convolution and by colour
+    arrows          vector fields by arrows over such a picture
+    backend         Mitsuba and Dr.Jit: the only module that imports them
+    studio          cameras, shots and lights; the backdrop and the bowl of volumes
+    mitsuba_shapes  meshes, cameras and lights as Mitsuba takes them; the integrator of noodles, paper and beads
+    smoke_slab      light through a slab of smoke, layer by layer
+    march           light in a volume, ray-marched without noise
+    denoise         path-traced volumes without their noise, guided by march
+    smoke           a density as a lit slab, as ink on paper, or as a volume
+    particles       particles as foam on a river, obstacles as stones
+    water           light under water: caustics, fog, shafts, sand
+    seaweed         blades under water
+    school          fish in a cube of water
+    noodles         threads as noodles on a plate
+    paper           sheets of paper in the air
+    beads           particles of the plane as beads on paper, around obstacles
+    tonemap         linear light to display values, and these to eight bits
+    layout          panels, labels, insets and legends as one figure
 
-Fields and densities have y up, row 0 the lowest; pictures have their top row first. Renderers return linear
-Rec.709 light, `film` turns it into sRGB display values in [0, 1]; field pictures are display values at once.
+Fields and densities have y up, row 0 the lowest; pictures have their top row first. Pictures are linear Rec.709 light,
+which `tonemap` turns into sRGB display values in [0, 1]; `lic` and `arrows` give display values at once.
 """

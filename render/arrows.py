@@ -1,4 +1,4 @@
-"""Arrows on a picture, as ma09 figure 2 shows the value of a field at a few points."""
+"""Arrows on a picture: values of a vector field at a few points, as in ma09 figure 2."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ WIDTH = 0.085  # of the shaft, as a share of the longest arrow's length
 
 def drawn(picture: np.ndarray, tails: np.ndarray, vectors: np.ndarray, length: float, colour: Colour,
           ) -> np.ndarray:
-    """`picture` (h, w, 3) display values with an arrow for each vector, edges smooth, a light rim round it.
+    """`picture` (h, w, 3) display values with an antialiased arrow for each vector, with a light outline.
 
-    tails: (N, 2) x, y in pixels from the lower left corner; vectors: (N, 2), y up; length: pixels of the longest
-    of them. A vector shorter than a tenth of the longest is left out.
+    tails    (N, 2) x, y in pixels from the lower left corner
+    vectors  (N, 2), y up; one shorter than a tenth of the longest is left out
+    length   of the longest arrow, pixels
     """
     result = picture.copy()
     longest = float(np.hypot(vectors[:, 0], vectors[:, 1]).max(initial=0.0))
@@ -38,8 +39,8 @@ def drawn(picture: np.ndarray, tails: np.ndarray, vectors: np.ndarray, length: f
 
 
 def grid(shape: Sequence[int], picture: Sequence[int], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`count` points across and as many down as keep the spacing: rows and columns of the cells (Y, X) they lie
-    in, and their places (N, 2) x, y in a picture (h, w), pixels from the lower left corner."""
+    """A regular grid of points, `count` of them across: rows and columns of the cells (Y, X) they lie in, and their
+    positions (N, 2) x, y in a picture (h, w), pixels from the lower left corner."""
     down = max(1, round(count * shape[0] / shape[1]))
     y, x = np.meshgrid((np.arange(down) + 0.5) / down, (np.arange(count) + 0.5) / count, indexing="ij")
     rows, columns = (y * shape[0]).astype(int).ravel(), (x * shape[1]).astype(int).ravel()
@@ -49,8 +50,8 @@ def grid(shape: Sequence[int], picture: Sequence[int], count: int) -> tuple[np.n
 
 def _coverage(shape: Sequence[int], tail: np.ndarray, vector: np.ndarray, half: float, grown: float,
               ) -> tuple[slice, slice, np.ndarray]:
-    """The window of a picture that an arrow touches (rows from the top), and how much of each pixel it covers."""
-    reach = float(np.hypot(*vector))
+    """Rows (from the top) and columns of the window that an arrow touches, and its coverage of each pixel there."""
+    length = float(np.hypot(*vector))
     margin = 4 * half + grown + 2
     x0, y0 = np.floor(np.minimum(tail, tail + vector) - margin).astype(int)
     x1, y1 = np.ceil(np.maximum(tail, tail + vector) + margin).astype(int)
@@ -58,11 +59,11 @@ def _coverage(shape: Sequence[int], tail: np.ndarray, vector: np.ndarray, half: 
     y0, y1 = np.clip([y0, y1], 0, shape[0])
     y = (np.arange(y1 - 1, y0 - 1, -1) + 0.5 - tail[1])[:, None]
     x = (np.arange(x0, x1) + 0.5 - tail[0])[None, :]
-    along, across = (x * vector[0] + y * vector[1]) / reach, np.abs(x * vector[1] - y * vector[0]) / reach
-    neck = max(reach * (1 - HEAD), reach - 7 * half)
+    along, across = (x * vector[0] + y * vector[1]) / length, np.abs(x * vector[1] - y * vector[0]) / length
+    neck = max(length * (1 - HEAD), length - 7 * half)
     shaft = np.maximum(across - half, np.maximum(-along, along - neck))
-    slope = 3 * half / (reach - neck)  # half width of the head per pixel of its length
-    head = np.maximum((across - (reach - along) * slope) / np.hypot(1.0, slope), neck - along)
+    slope = 3 * half / (length - neck)  # half width of the head per pixel of its length
+    head = np.maximum((across - (length - along) * slope) / np.hypot(1.0, slope), neck - along)
     distance = np.minimum(shaft, head)
     cover = np.clip(0.5 - (distance - grown), 0.0, 1.0).astype(np.float32)
     return slice(shape[0] - y1, shape[0] - y0), slice(x0, x1), cover

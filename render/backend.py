@@ -1,9 +1,9 @@
-"""The one home of Mitsuba and Dr.Jit: which LLVM they use, which folder their plug-ins come from.
+"""The only module that imports Mitsuba and Dr.Jit: which LLVM they use, which folder their plug-ins come from.
 
-Two dangers are dealt with here, so that no other module needs to know them. Mitsuba looks for plug-ins in the
-working directory first, and loads any library it finds there; `mitsuba` takes that folder off its search path
-before anything is instantiated. Dr.Jit accepts LLVM 15 and 16 and then aborts the whole process on a real
-render; `llvm_library` believes a candidate only after a child process has rendered with it.
+It works around two problems. Mitsuba looks for plug-ins in the working directory first, and loads any library it finds
+there; `mitsuba` removes that folder from the search path before anything is instantiated. Dr.Jit accepts LLVM 15 and
+16 and then aborts the process on a real render; `llvm_library` accepts a candidate only after a child process has
+rendered with it.
 
 Run as a script (`python backend.py VARIANT [LIBRARY]`), this file is that child process.
 """
@@ -23,26 +23,26 @@ from pathlib import Path
 from typing import Any
 
 OLDEST_LLVM = 17  # 14 is refused by Dr.Jit; 15 and 16 abort with "Cannot select … fminimum"
-PREFERRED_LLVM = 19  # Debian's libllvm19, the one every reference picture is made with
-MENDING = "install Debian's libllvm19 (apt-get install libllvm19)"
+PREFERRED_LLVM = 19  # Debian's libllvm19, which made every reference picture
+REMEDY = "install Debian's libllvm19 (apt-get install libllvm19)"
 LIBRARY_FOLDERS = tuple(
     folder for pattern in ("*-linux-gnu", "llvm-*/lib") for folder in sorted(Path("/usr/lib").glob(pattern))
 )
-PROOF_SECONDS = 120.0  # a cold proof takes about one second; a busy farm node is given its time
+PROOF_SECONDS = 120.0  # a cold trial takes about one second, on a busy farm node longer
 
 
 class RenderUnavailable(RuntimeError):
-    """Mitsuba cannot render here; the message is one line and says what to install."""
+    """Mitsuba cannot render here; the message is one line that says what to install."""
 
 
 def version_in_name(library: Path) -> int:
-    """The LLVM version a file name tells (`libLLVM-15.so.1`, `libLLVM.so.19.1`), 0 if it tells none."""
+    """The LLVM version in a file name (`libLLVM-15.so.1`, `libLLVM.so.19.1`), 0 if there is none."""
     found = re.search(r"libLLVM(?:-|\.so\.)(\d+)", library.name)
     return int(found[1]) if found else 0
 
 
 def candidates(folders: tuple[Path, ...] = LIBRARY_FOLDERS) -> list[Path]:
-    """The LLVM libraries worth a trial, best first: 19, then newer ones, then 18 and 17; each file once.
+    """The LLVM libraries to try, best first: 19, then newer ones, then 18 and 17; each file once.
 
     `DRJIT_LIBLLVM_PATH`, where the user has set it, is the only candidate.
     """
@@ -60,9 +60,9 @@ def candidates(folders: tuple[Path, ...] = LIBRARY_FOLDERS) -> list[Path]:
 
 
 def proven(variant: str, library: Path | None = None) -> str:
-    """Renders a small volume in a child process; returns "" if it can, else why not, in one line."""
+    """Renders a small volume in a child process; returns "" on success, else the reason in one line."""
     with tempfile.TemporaryDirectory(prefix="flowloom-proof-") as folder:
-        # an empty kernel cache: kernels that another LLVM compiled would hide that this one cannot
+        # an empty kernel cache: kernels compiled by another LLVM would hide that this one fails
         environment = os.environ | {"DRJIT_CACHE_DIR": folder}
         command = [sys.executable, "-I", __file__, variant, *([str(library)] if library else [])]
         try:
@@ -81,7 +81,7 @@ def proven(variant: str, library: Path | None = None) -> str:
 
 
 def _verdict_file(library: Path) -> Path:
-    """Where a proven library is remembered: another file, Mitsuba or Dr.Jit has another name."""
+    """The marker of a proven library; its name depends on the library's file and the versions of Mitsuba and Dr.Jit."""
     state = library.stat()
     versions = [importlib.metadata.version(name) for name in ("mitsuba", "drjit")]
     key = json.dumps([str(library), state.st_size, state.st_mtime_ns, *versions])
@@ -89,8 +89,8 @@ def _verdict_file(library: Path) -> Path:
     return cache / f"llvm-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
 
 
-def _believed(library: Path) -> str:
-    """`proven`, remembered across runs; only success is, for a failure may be the machine's bad day."""
+def _proven_once(library: Path) -> str:
+    """`proven`, cached on disk; only success is cached, as a failure may be temporary."""
     try:
         verdict = _verdict_file(library)
     except OSError as error:
@@ -105,7 +105,7 @@ def _believed(library: Path) -> str:
             verdict.parent.mkdir(parents=True, exist_ok=True)
             verdict.touch()
         except OSError:
-            pass  # a read-only home: the proof is made again next time
+            pass  # a read-only home directory: the trial is repeated next time
     return reason
 
 
@@ -117,17 +117,17 @@ def llvm_library() -> Path:
         if 0 < version_in_name(library.resolve()) < OLDEST_LLVM:
             reason = f"LLVM {version_in_name(library.resolve())} is too old"
         else:
-            reason = _believed(library)
+            reason = _proven_once(library)
         if not reason:
             return library
         reasons.append(f"{library}: {reason}")
     found = "; ".join(reasons) if reasons else f"no LLVM {OLDEST_LLVM} or newer"
     unset = "unset DRJIT_LIBLLVM_PATH or " if os.environ.get("DRJIT_LIBLLVM_PATH") else ""
-    raise RenderUnavailable(f"{found}; {unset}{MENDING}")
+    raise RenderUnavailable(f"{found}; {unset}{REMEDY}")
 
 
 def _load(variant: str, library: Path | None) -> Any:
-    """Imports Mitsuba with Dr.Jit on `library`, bars the working directory and sets the variant."""
+    """Imports Mitsuba with Dr.Jit on `library`, excludes the working directory and sets the variant."""
     if library:
         os.environ["DRJIT_LIBLLVM_PATH"] = str(library)
     try:
@@ -138,7 +138,7 @@ def _load(variant: str, library: Path | None) -> Any:
     resolver.clear()
     resolver.append(str(Path(mitsuba.__file__).parent))
     mitsuba.set_variant(variant)
-    # an interrupted render is ours to report, in one line
+    # the command line reports an interrupted render, in one line
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
     return mitsuba
 
@@ -151,7 +151,7 @@ def mitsuba(variant: str) -> Any:
     """
     library: Path | None = None
     try:
-        # also for scalar variants: Dr.Jit reads the path once, at its import, and llvm may be asked for later
+        # also for scalar variants: Dr.Jit reads the path once, at its import, and llvm may be requested later
         library = llvm_library()
     except RenderUnavailable:
         if variant.startswith("llvm"):
@@ -160,14 +160,14 @@ def mitsuba(variant: str) -> Any:
 
 
 def drjit() -> Any:
-    """The drjit module that a loaded `mitsuba` computes with."""
+    """The drjit module of the loaded `mitsuba`."""
     import drjit as loaded
 
     return loaded
 
 
 def versions(variant: str) -> dict[str, str]:
-    """What a rendered picture's bits depend on: the variant, Mitsuba, Dr.Jit and (llvm variants) LLVM."""
+    """The versions that a picture's bits depend on: variant, Mitsuba, Dr.Jit and (llvm variants) LLVM."""
     loaded = mitsuba(variant)
     import drjit
 
@@ -178,7 +178,7 @@ def versions(variant: str) -> dict[str, str]:
 
 
 def _proof(variant: str, library: Path | None) -> None:
-    """Renders 8 x 8 pixels of a homogeneously lit grid volume: every instruction that volpath needs."""
+    """Renders 8 x 8 pixels of a grid volume in constant light: every instruction that volpath needs."""
     import numpy as np
 
     mi = _load(variant, library)

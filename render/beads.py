@@ -1,7 +1,7 @@
-"""Particles of the plane as beads on white paper, photographed from straight above; obstacles stand on it.
+"""Particles of the plane as beads on white paper with raised obstacles, seen from straight above.
 
-`picture` path-traces solids with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row first. An
-exemplar's inset is the same picture of its own ground. `render.tonemap` tones it ("filmic").
+`picture` path-traces beads with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row first. An
+exemplar's inset is the same picture with the exemplar's ground. `render.tonemap` tone-maps it ("filmic").
 
 World units; x to the right and y up in the picture, z towards the camera.
 """
@@ -17,8 +17,8 @@ from scipy import ndimage
 from render import backend, mitsuba_shapes, studio
 
 SLANT = (-0.42, 0.62, 1.0)  # towards the lamp: from the upper left
-LAMP = 0.34  # edge of the lamp over its distance: how soft shadows are
-AWAY = 18.0  # how far it is, in heights of the picture: the paper is lit evenly
+LAMP = 0.34  # edge of the lamp over its distance: softness of the shadows
+LAMP_DISTANCE = 18.0  # in heights of the picture: far enough to light the paper evenly
 LAMP_LIGHT = (3.05, 2.93, 2.74)  # irradiance of a surface that faces it
 AIR = (0.30, 0.315, 0.345)  # radiance from everywhere
 PAPER = (0.80, 0.795, 0.78)
@@ -26,22 +26,22 @@ BEYOND = (0.46, 0.46, 0.455)  # paper outside the domain
 OBSTACLE = (0.050, 0.058, 0.070)
 RISE = 0.030  # of obstacles, in heights of the picture
 BEVEL = 0.012
-SHEET = 0.006  # thickness of the domain's paper, which lies on the paper beyond
-FINE = 2  # relief vertices per pixel, along each axis; at most MOST
-MOST = 1100
+THICKNESS = 0.006  # of the domain's paper, which lies on the paper beyond
+FINE = 2  # relief vertices per pixel along each axis
+MOST_ROWS = 1100  # of relief vertices
 TILE = 16  # cells
 BOUNCES = 2
 
 
 @dataclass(frozen=True)
 class Ground:
-    """What particles lie on.
+    """The surface that particles lie on.
 
     low, high  (2,) corners of the picture, world units
-    inside     (Y, X) float32, world units: distance to the border of the domain, positive inside, as
-               `synth.elements.constraints.Domain` has it; None: paper everywhere
+    inside     (Y, X) float32, world units: distance to the border of the domain, positive inside, as in
+               `synth.elements.constraints.Domain`; None: paper everywhere
     cell       edge of its cells, world units; origin (2,): centre of its first cell
-    Holes in the domain are obstacles, what encloses it is beyond.
+    Holes in the domain are obstacles; the area that encloses it is paper beyond the domain.
     """
 
     low: tuple[float, float]
@@ -61,7 +61,7 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, ground
     mi = backend.mitsuba("llvm_ad_rgb")
     low, high = np.array(ground.low, float), np.array(ground.high, float)
     height = max(1, round(shot.width * (high[1] - low[1]) / (high[0] - low[0])))
-    # the picture becomes one unit high: lamp, bevels and shadows look the same at any scale
+    # scaled until the picture is one unit high: lamp, bevels and shadows are the same at any scale
     scale = 1 / (high[1] - low[1])
     middle = np.array([*(low + high) / 2, 0.0])
     toward = np.array(SLANT) / np.linalg.norm(SLANT)
@@ -72,8 +72,8 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, ground
         "lamp": {
             "type": "rectangle",
             "to_world": mi.ScalarTransform4f().look_at(
-                origin=list(AWAY * toward), target=[0, 0, 0], up=[0, 1, 0]
-            ).scale([0.5 * AWAY * LAMP, 0.5 * AWAY * LAMP, 1]),
+                origin=list(LAMP_DISTANCE * toward), target=[0, 0, 0], up=[0, 1, 0]
+            ).scale([0.5 * LAMP_DISTANCE * LAMP, 0.5 * LAMP_DISTANCE * LAMP, 1]),
             "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [c / LAMP**2 for c in LAMP_LIGHT]}},
         },
         "air": mitsuba_shapes.sky(AIR),
@@ -86,15 +86,15 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, ground
 
 
 def _ground(mi: Any, ground: Ground, height: int, scale: float, middle: np.ndarray) -> Any:
-    """The paper of the domain, obstacles on it and the paper beyond, as one relief a little larger than the picture."""
+    """The domain's paper, the obstacles and the paper beyond, as one relief slightly larger than the picture."""
     low, high = (np.array(corner, float) for corner in (ground.low, ground.high))
     margin = 0.06 * (high[1] - low[1])
     low, high = low - margin, high + margin
-    rows = min(FINE * height, MOST) if ground.inside is not None else 2
+    rows = min(FINE * height, MOST_ROWS) if ground.inside is not None else 2
     columns = max(2, round(rows * (high[0] - low[0]) / (high[1] - low[1])))
     x, y = np.meshgrid(np.linspace(low[0], high[0], columns), np.linspace(low[1], high[1], rows))
-    away, hole = _distances(ground, x, y)
-    z, colour = relief(away * scale, hole)
+    distance, hole = _distances(ground, x, y)
+    z, colour = relief(distance * scale, hole)
     points = np.stack([(x - middle[0]) * scale, (y - middle[1]) * scale, z], -1).reshape(-1, 3)
     used, faces = np.unique(tiled(z, colour), return_inverse=True)
     points, colour, faces = points[used], colour.reshape(-1, 3)[used], faces.reshape(-1, 3)
@@ -103,10 +103,10 @@ def _ground(mi: Any, ground: Ground, height: int, scale: float, middle: np.ndarr
 
 
 def tiled(z: np.ndarray, colour: np.ndarray) -> np.ndarray:
-    """Triangles (M, 3) of a relief, of heights (Y, X) and colours (Y, X, 3), as indices of its vertices row by row.
+    """Triangles (M, 3) of a relief with heights z (Y, X) and colours (Y, X, 3), as indices of vertices row by row.
 
-    Two for each cell, and two for each tile of TILE × TILE cells that is level, of one colour and next to none that is
-    not: few places of the paper need more, and a tree over millions of triangles takes longer than the picture.
+    Two per cell, but only two per tile of TILE × TILE cells where the tile and its neighbours are level and of one
+    colour, as most of the paper is: to build a tree over millions of triangles would take longer than the picture.
     """
     rows, columns = np.array(z.shape) - 1
     of_vertex = np.concatenate([z[..., None], colour], axis=-1)
@@ -115,11 +115,11 @@ def tiled(z: np.ndarray, colour: np.ndarray) -> np.ndarray:
     level = same_row[:, :-1] & same_row[:, 1:] & same_column[:-1] & same_column[1:]
     level = ndimage.minimum_filter(level, 3, mode="nearest")
     tiles = rows // TILE, columns // TILE
-    whole = level[: tiles[0] * TILE, : tiles[1] * TILE].reshape(tiles[0], TILE, tiles[1], TILE).all(axis=(1, 3))
+    flat = level[: tiles[0] * TILE, : tiles[1] * TILE].reshape(tiles[0], TILE, tiles[1], TILE).all(axis=(1, 3))
     fine = np.ones((rows, columns), bool)
-    fine[: tiles[0] * TILE, : tiles[1] * TILE] = ~whole.repeat(TILE, axis=0).repeat(TILE, axis=1)
+    fine[: tiles[0] * TILE, : tiles[1] * TILE] = ~flat.repeat(TILE, axis=0).repeat(TILE, axis=1)
     found = []
-    for (y, x), edge in ((np.nonzero(fine), 1), (np.array(np.nonzero(whole)) * TILE, TILE)):
+    for (y, x), edge in ((np.nonzero(fine), 1), (np.array(np.nonzero(flat)) * TILE, TILE)):
         corner = y * (columns + 1) + x
         right, up = edge, edge * (columns + 1)
         found += [np.stack([corner, corner + right, corner + up + right], 1),
@@ -128,12 +128,12 @@ def tiled(z: np.ndarray, colour: np.ndarray) -> np.ndarray:
 
 
 def _distances(ground: Ground, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """At points: the distance to the domain's border, positive inside; and whether the nearest outside is a hole."""
+    """Distance of points to the domain's border, positive inside; and whether the nearest area outside is a hole."""
     if ground.inside is None:
         return np.full(x.shape, np.inf), np.zeros(x.shape, bool)
     at = np.array([(y - ground.origin[1]) / ground.cell, (x - ground.origin[0]) / ground.cell])
-    away = ndimage.map_coordinates(ground.inside.astype(float), at, order=3, mode="nearest")
-    # what touches the grid's edge encloses the domain, the rest is holes in it
+    distance = ndimage.map_coordinates(ground.inside.astype(float), at, order=3, mode="nearest")
+    # an area that touches the grid's edge encloses the domain; the others are holes in it
     padded = np.pad(ground.inside < 0, 1, mode="edge")
     parts, _ = ndimage.label(padded, np.ones((3, 3)))
     edge = np.unique(np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]]))
@@ -142,16 +142,16 @@ def _distances(ground: Ground, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray
     rim = (parts > 0)[1:-1, 1:-1] & ~holes
     near_rim = ndimage.distance_transform_edt(~rim) if rim.any() else np.full(holes.shape, 1e9)
     nearer = (near_hole < near_rim).astype(float)
-    return away, ndimage.map_coordinates(nearer, at, order=0, mode="nearest") > 0.5
+    return distance, ndimage.map_coordinates(nearer, at, order=0, mode="nearest") > 0.5
 
 
-def relief(away: np.ndarray, hole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Height (Y, X) and linear colour (Y, X, 3) of the ground, at distances `away` (Y, X) from the domain's border.
+def relief(distance: np.ndarray, hole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Height (Y, X) and linear colour (Y, X, 3) of the ground at distances (Y, X) from the domain's border.
 
-    In heights of the picture; obstacles have a round edge, and the domain's paper lies on the paper beyond.
+    Lengths in heights of the picture. Obstacles have a round edge, and the domain's paper lies on the paper beyond.
     """
-    depth = np.maximum(-away, 0)
+    depth = np.maximum(-distance, 0)
     round_edge = np.sqrt(1 - (1 - np.clip(depth / BEVEL, 0, 1)) ** 2)
-    z = np.where(hole, RISE * round_edge, -SHEET * np.clip(depth / 0.004, 0, 1))
-    inside = (away > 0)[..., None]
+    z = np.where(hole, RISE * round_edge, -THICKNESS * np.clip(depth / 0.004, 0, 1))
+    inside = (distance > 0)[..., None]
     return z, np.where(inside, PAPER, np.where(hole[..., None], OBSTACLE, BEYOND))

@@ -1,7 +1,7 @@
-"""Figures as papers print them: panels in rows on white, thin frames, a label below each, insets, a legend.
+"""Figures as papers print them: panels in rows on white, thin borders, a label below each, insets, a legend.
 
-The lettering is Droid Serif (Apache 2.0), which the OpenImageIO package brings along; Greek letters, which it
-lacks, are Droid Sans Mono's. Labels may hold `*asterisks*` for italics, as a paper sets its symbols.
+Text is set in Droid Serif (Apache 2.0), which the OpenImageIO package contains; Greek letters, which it lacks, in Droid
+Sans Mono. Labels may hold `*asterisks*` for italics, as a paper sets its symbols.
 """
 
 from __future__ import annotations
@@ -17,26 +17,28 @@ from scipy import sparse
 
 from render import tonemap
 
-FRAME = 0.45  # display grey of the thin frame round a panel
-INK = 0.10  # display grey of the lettering
-LEGIBLE = 12  # pixels: letters get no smaller
-LATIN = "àâäçéèêëïîôöùûüÀÄÇÉÈÖÜß×÷±²³°·–—‘’“”…"  # what Droid Serif has beyond ASCII, as far as labels need it
+BORDER = 0.45  # display grey of a panel's border
+INK = 0.10  # display grey of text
+LEGIBLE = 12  # smallest size of text, pixels
+LATIN = "àâäçéèêëïîôöùûüÀÄÇÉÈÖÜß×÷±²³°·–—‘’“”…"  # what labels need of Droid Serif beyond ASCII
 
 
 @dataclass(frozen=True)
 class Panel:
     """One picture of a figure.
 
-    picture: (h, w, 3) uint8 sRGB or float display values, top row first; label: set below it, "" for none;
-    inset: a smaller picture for the lower left corner; legend: a disc (s, s, 4) for the lower right one
-    (`lic.wheel`); frame: whether a thin line goes round it.
+    picture  (h, w, 3) uint8 sRGB or float display values, top row first
+    label    set below it; "" for none
+    inset    a smaller picture for the lower left corner
+    legend   a disc (s, s, 4) for the lower right corner (`lic.wheel`)
+    border   whether it has a thin border
     """
 
     picture: np.ndarray
     label: str = ""
     inset: np.ndarray | None = None
     legend: np.ndarray | None = None
-    frame: bool = True
+    border: bool = True
 
 
 def display(picture: np.ndarray) -> np.ndarray:
@@ -47,9 +49,9 @@ def display(picture: np.ndarray) -> np.ndarray:
 
 
 def fitted(picture: np.ndarray, width: int) -> np.ndarray:
-    """`picture` (h, w, 3) at `width` pixels, kept crisp: pixels repeated upwards, averaged by area downwards.
+    """`picture` (h, w, 3) resampled to `width` pixels: enlarged by repeating pixels, reduced by averaging areas.
 
-    Averaging is done on linear light, so thin bright lines keep their brightness.
+    Averages are of linear light, so thin bright lines keep their brightness.
     """
     shown = display(picture)
     h, w = shown.shape[:2]
@@ -64,7 +66,7 @@ def fitted(picture: np.ndarray, width: int) -> np.ndarray:
 
 
 def _averaged_rows(values: np.ndarray, count: int) -> np.ndarray:
-    """`values` (n, ...) as `count` rows, each the exact mean of the rows and parts of rows it covers."""
+    """`values` (n, ...) as `count` rows, each the exact mean of the rows and fractions of rows it covers."""
     n = len(values)
     edges = np.arange(count + 1) * (n / count)
     covered = edges[:-1].astype(int)[:, None] + np.arange(int(np.ceil(n / count)) + 1)
@@ -83,7 +85,7 @@ def _font(name: str) -> str:
 
     path = Path(OpenImageIO.__file__).parent / "share" / "fonts" / "OpenImageIO" / f"{name}.ttf"
     if not path.is_file():
-        raise ValueError(f"the lettering's font is missing: {path}; run make setup")
+        raise ValueError(f"font file is missing: {path}; run make setup")
     return str(path)
 
 
@@ -93,9 +95,9 @@ def _line_height(size: int) -> int:
 
 @functools.lru_cache(maxsize=256)  # the same in every frame
 def lettering(text: str, size: int) -> np.ndarray:
-    """One line of text as coverage (h, w) float32 in [0, 1], `size` pixels to the em, cut to its own width.
+    """One line of text as coverage (h, w) float32 in [0, 1], `size` pixels per em, as wide as the text.
 
-    All lines of one size have the same height and the same base line.
+    All lines of one size have the same height and the same baseline.
     """
     drawn = [np.zeros((_line_height(size), 0), np.float32)]
     for number, piece in enumerate(text.replace("′", "'").split("*")):  # a slanted ' is a prime
@@ -116,17 +118,17 @@ def _drawn(text: str, size: int, font: str) -> np.ndarray:
     def advance(words: str) -> int:
         return int(oiio.ImageBufAlgo.text_size(words, size, _font(font)).xend)
 
-    # the box of a text ends with its ink: a bar behind it shows the advance, blanks included
+    # OpenImageIO's box ends with the last ink: a bar after the text gives the advance, spaces included
     wide = max(1, advance(text + "|") - advance("|"))
     page = oiio.ImageBuf(oiio.ImageSpec(wide + size, _line_height(size), 1, "float"))
     oiio.ImageBufAlgo.zero(page)
     if not oiio.ImageBufAlgo.render_text(page, 0, round(1.05 * size), text, size, _font(font), (1.0,)):
-        raise ValueError(f"cannot letter {text!r}: {page.geterror()}")
+        raise ValueError(f"cannot draw the text {text!r}: {page.geterror()}")
     return np.asarray(page.get_pixels(oiio.FLOAT))[:, :wide, 0]
 
 
 def _leaning(upright: np.ndarray, size: int) -> np.ndarray:
-    """Greek letters slanted about the base line: they are symbols, and the serif has none of its own."""
+    """Greek letters slanted about the baseline, as symbols are: the sans font has no italics."""
     columns = np.arange(upright.shape[1])
     shifts = 0.2 * (np.arange(len(upright)) - round(0.8 * size))
     return np.stack([np.interp(columns + s, columns, line, left=0.0, right=0.0)
@@ -135,11 +137,13 @@ def _leaning(upright: np.ndarray, size: int) -> np.ndarray:
 
 def figure(rows: Sequence[Sequence[Panel]], *, letter: int | None = None, gap: int = 20,
            margin: int = 28) -> np.ndarray:
-    """Panels in rows (each its own widths) as one picture (h, w, 3) uint8 sRGB on white.
+    """Panels in rows as one picture (h, w, 3) uint8 sRGB on white.
 
-    Panels keep their pixels; those of a row stand on one base line, and rows of as many panels stand column
-    under column. gap, margin: pixels; letter: size of the labels, pixels: a twentieth of the widest panel if
-    left out, and less where a label would be wider than its panel.
+    letter       size of the labels, pixels; None: a twentieth of the widest panel, or less where a label would be wider
+                 than its panel
+    gap, margin  between panels and around the figure, pixels
+    Panels keep their pixels; those of a row are aligned at the bottom, and rows with the same number of panels share
+    their columns.
     """
     if not rows or not all(rows):
         raise ValueError("a figure needs at least one panel in each row")
@@ -156,13 +160,13 @@ def figure(rows: Sequence[Sequence[Panel]], *, letter: int | None = None, gap: i
     spaced = [padded[0]]
     for strip in padded[1:]:
         spaced += [np.ones((gap, width, 3), np.float32), strip]
-    sheet = np.pad(np.concatenate(spaced), ((margin, margin), (margin, margin), (0, 0)), constant_values=1.0)
-    return np.rint(sheet * 255.0).astype(np.uint8)
+    page = np.pad(np.concatenate(spaced), ((margin, margin), (margin, margin), (0, 0)), constant_values=1.0)
+    return np.rint(page * 255.0).astype(np.uint8)
 
 
 def _fitting(labels: list[tuple[str, int]], size: int) -> int:
-    """The largest size up to `size`, but not below LEGIBLE, at which each label is no wider than its room."""
-    while size > LEGIBLE and any(lettering(label, size).shape[1] > room for label, room in labels):
+    """The largest size up to `size`, but not below LEGIBLE, at which no label is wider than its panel."""
+    while size > LEGIBLE and any(lettering(label, size).shape[1] > width for label, width in labels):
         size -= 1
     return max(size, LEGIBLE)
 
@@ -174,38 +178,38 @@ def _centred(strip: np.ndarray, width: int) -> np.ndarray:
 
 
 def _finished(panel: Panel) -> np.ndarray:
-    """A panel's picture with its inset, its legend and its frame."""
+    """A panel's picture with its inset, legend and border."""
     picture = display(_eight_bit(panel.picture))
     h, w = picture.shape[:2]
-    room = max(4, round(0.025 * min(h, w)))
+    margin = max(4, round(0.025 * min(h, w)))
     if panel.inset is not None:
-        inset = _framed(np.pad(display(panel.inset), ((3, 3), (3, 3), (0, 0)), constant_values=1.0))
+        inset = _bordered(np.pad(display(panel.inset), ((3, 3), (3, 3), (0, 0)), constant_values=1.0))
         ih, iw = inset.shape[:2]
-        if ih + 2 * room > h or iw + 2 * room > w:
+        if ih + 2 * margin > h or iw + 2 * margin > w:
             raise ValueError(f"an inset of {iw} x {ih} does not fit into a panel of {w} x {h}")
-        picture[h - room - ih:h - room, room:room + iw] = inset
+        picture[h - margin - ih:h - margin, margin:margin + iw] = inset
     if panel.legend is not None:
         s = len(panel.legend)
-        corner = picture[h - room - s:h - room, w - room - s:w - room]
+        corner = picture[h - margin - s:h - margin, w - margin - s:w - margin]
         cover = panel.legend[..., 3:]
         corner[:] = corner * (1.0 - cover) + panel.legend[..., :3] * cover
-    return _framed(picture) if panel.frame else picture
+    return _bordered(picture) if panel.border else picture
 
 
 def _eight_bit(picture: np.ndarray) -> np.ndarray:
-    """Bytes as they are; float values dithered, here and not at the end, so that bytes keep their value."""
+    """uint8 as it is; floats dithered, here and not at the end, so that uint8 pictures keep their values."""
     return picture if picture.dtype == np.uint8 else tonemap.eight_bit(picture)
 
 
-def _framed(picture: np.ndarray) -> np.ndarray:
-    picture[[0, -1]] = FRAME
-    picture[:, [0, -1]] = FRAME
+def _bordered(picture: np.ndarray) -> np.ndarray:
+    picture[[0, -1]] = BORDER
+    picture[:, [0, -1]] = BORDER
     return picture
 
 
 def _row(pictures: list[np.ndarray], labels: list[str], widths: list[int], letter: int,
          gap: int) -> np.ndarray:
-    """One row of finished panels over their labels, each in the middle of its column, (h, w, 3) display values."""
+    """One row of finished panels above their labels, each centred in its column, (h, w, 3) display values."""
     height = max(len(picture) for picture in pictures)
     below = _line_height(letter) + round(0.45 * letter) if any(labels) else 0
     columns = []

@@ -1,11 +1,11 @@
-"""Noodles on a plate, by window light: round, glossy, a little translucent.
+"""Noodles on a plate in window light: round, glossy, a little translucent.
 
 `picture` path-traces tubes with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row first;
-`inset` does the same with an exemplar, alone on the table. `render.tonemap` tones both ("filmic").
+`inset` does the same with an exemplar, on the table without a plate. `render.tonemap` tone-maps both ("filmic").
 
-There is no scattering under a surface. Instead a part of the light goes through a tube's wall, diffusely, into the
-tube and out again on the other side, and takes the colour of dough each time: thin places and edges against the
-light glow, and the heart of a heap is warm instead of black.
+There is no subsurface scattering. Instead a part of the light is transmitted diffusely by the wall of a tube, into it
+and out on the other side, and takes the colour of dough each time: thin parts and edges against the light glow, and
+the inside of a heap is warm instead of black.
 
 World units: the plate's well is at y = 0, a plate of noodles about one unit wide, centred on x = z = 0.
 """
@@ -27,11 +27,11 @@ TABLE = (0.068, 0.078, 0.088)
 TABLE_LEVEL = -0.052  # y, below the plate's well
 GLAZE = (0.70, 0.685, 0.66)
 PLATE = 0.86  # radius
-MARGIN = 1.45  # of a plate's radius over the noodles' reach
+MARGIN = 1.45  # radius of a plate over the extent of the noodles
 BOUNCES = 2
 
 # dough
-THROUGH = 0.30  # share of the wall that lets light in
+THROUGH = 0.30  # weight of the translucent part of the BSDF
 GLOSS = {"roughness": 0.30, "specular": 0.5, "clearcoat": 1.0, "clearcoat_gloss": 0.93}  # oil
 
 
@@ -49,10 +49,10 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray,
 
 
 def view(low: np.ndarray, high: np.ndarray, aspect: float) -> tuple[studio.Camera, float]:
-    """The camera, and the radius of a plate, for noodles that a box from `low` to `high` (3,) holds in all frames.
+    """The camera, and the radius of the plate, for noodles within a box from `low` to `high` (3,) in all frames.
 
     aspect  width of the picture over its height
-    The plate stays where it is, round x = z = 0, and all of it is in the picture.
+    The plate is centred on x = z = 0, and all of it is in the picture.
     """
     low, high = np.asarray(low, float), np.asarray(high, float)
     radius = MARGIN * float(np.abs(np.stack([low, high])[:, [0, 2]]).max())
@@ -64,7 +64,7 @@ def view(low: np.ndarray, high: np.ndarray, aspect: float) -> tuple[studio.Camer
 def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,
           shot: studio.Shot) -> np.ndarray:
     """An exemplar's noodles on the table without a plate, lit as in `picture`; the box from `low` to `high` (3,),
-    which holds them in all frames, fills the picture."""
+    which contains them in all frames, fills the picture."""
     camera = shot.camera or CAMERA
     level = float(studio.placed(np.stack([low, high]), low, high, camera, shot.aspect)[0, 1])
     placed = studio.placed(vertices, low, high, camera, shot.aspect)
@@ -92,7 +92,7 @@ def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: 
 
 
 def dough() -> dict[str, Any]:
-    """What noodles are made of; its colour is the vertices'."""
+    """The BSDF of noodles, in the colours of the vertices."""
     colour = mitsuba_shapes.VERTEX_COLOUR
     return {
         "type": "blendbsdf", "weight": THROUGH,

@@ -1,7 +1,7 @@
-"""Paper in the air and on the floor: light comes through it, and its shadows are soft.
+"""Sheets of paper in the air and on the floor: translucent, with soft shadows.
 
 `picture` path-traces sheets with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row first;
-`inset` does the same with an exemplar, held in the middle of the picture. `render.tonemap` tones both ("filmic").
+`inset` does the same with an exemplar in the middle of the picture. `render.tonemap` tone-maps both ("filmic").
 
 World units: floor at y = 0, the scene about one unit high, centred on x = z = 0.
 """
@@ -20,11 +20,11 @@ SUN = studio.Softbox((-3.4, 3.0, -0.9), (0.0, 0.4, 0.0), (1.2, 1.2), (94.0, 84.0
 FILL = studio.Softbox((3.4, 1.6, 3.4), (0.0, 0.4, 0.0), (3.2, 2.8), (1.3, 1.45, 1.7), 0.5)
 AIR = (0.22, 0.23, 0.25)  # radiance from everywhere
 BACKDROP = (0.355, 0.36, 0.365)
-CLEAR = 0.2  # between an inset's sheets and its floor
+CLEARANCE = 0.2  # between an inset's sheets and its floor
 BOUNCES = 1
 PALETTE = ((0.965, 0.955, 0.930), (0.925, 0.905, 0.850), (0.905, 0.430, 0.330), (0.970, 0.780, 0.380),
            (0.330, 0.560, 0.620))
-"""Colours that go together, sRGB: white, cream, vermilion, amber, petrol."""
+"""sRGB: white, cream, vermilion, amber, petrol."""
 
 
 def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: studio.Shot) -> np.ndarray:
@@ -38,12 +38,12 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: 
 
 def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,
           shot: studio.Shot) -> np.ndarray:
-    """An exemplar's sheets in the air, lit as in `picture`; the box from `low` to `high` (3,), which holds them in
+    """An exemplar's sheets in the air, lit as in `picture`; the box from `low` to `high` (3,), which contains them in
     all frames, fills the picture."""
     camera = shot.camera or CAMERA
     box = studio.placed(np.stack([low, high]), low, high, camera, shot.aspect)
     placed = studio.placed(vertices, low, high, camera, shot.aspect)
-    return _traced(placed, faces, colours, replace(shot, camera=camera), min(0.0, float(box[0, 1]) - CLEAR))
+    return _traced(placed, faces, colours, replace(shot, camera=camera), min(0.0, float(box[0, 1]) - CLEARANCE))
 
 
 def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: studio.Shot,

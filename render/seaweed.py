@@ -1,8 +1,7 @@
-"""Seaweed under water: thin blades that let the sun through, on rippled sand, in water that takes the distance away.
+"""Seaweed under water: translucent blades on rippled sand, which fade into the water with distance.
 
-`picture` path-traces one merged mesh with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row
-first; `render.tonemap` tones it ("filmic"). The sun comes through a waving surface, so it falls in caustics; the water
-between the eye and what it meets is a fog with the sun's shafts in it, reckoned for each ray.
+`picture` path-traces one merged mesh with Mitsuba (llvm) through `render.water`, with caustics and light shafts, and
+returns linear Rec.709 light (h, w, 3) float32, top row first; `render.tonemap` tone-maps it ("filmic").
 
 World units: floor at y = 0, the bed about one unit high, centred on x = z = 0.
 """

@@ -1,7 +1,7 @@
-"""The studio a volume is photographed in: camera, lights, seamless backdrop, the bowl smoke rises from.
+"""Camera, shot and lights, and the studio of volumes: a seamless backdrop and the bowl that smoke rises from.
 
-Everything is plain numbers and vertex/face arrays in world units (y up, floor at y = 0, the subject about one
-unit high, centred on x = z = 0); `render.smoke` hands them to Mitsuba, a pipeline may write them as meshes.
+Everything is plain numbers and vertex/face arrays in world units (y up, floor at y = 0, the subject about one unit
+high, centred on x = z = 0). `render.mitsuba_shapes` turns them into Mitsuba's scene.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Camera:
-    """A long lens at the height of the subject; `fov` is the vertical angle of view in degrees."""
+    """A perspective camera, by default a long lens at the subject's height; `fov` is vertical, in degrees."""
 
     position: Point = (0.0, 0.92, 6.2)
     target: Point = (0.0, 0.475, 0.0)
@@ -81,9 +81,9 @@ class Shot:
 
 @dataclass(frozen=True)
 class Softbox:
-    """A rectangular light of `size` (width, height), its face turned to `target`.
+    """A rectangular light of `size` (width, height) that faces `target`.
 
-    radiance: red, green, blue; share: how often the renderer chooses it, relative to the other lights.
+    radiance: red, green, blue; share: sampling weight relative to the other lights
     """
 
     position: Point
@@ -94,7 +94,7 @@ class Softbox:
 
     @property
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
-        """Its lower and its left edge (3,), as vectors: level, and upright."""
+        """Two edges (3,) as vectors: the horizontal one, and the upright one."""
         facing = np.array(self.target) - np.array(self.position)
         level = np.cross([0.0, 1.0, 0.0], facing)
         level *= self.size[0] / np.linalg.norm(level)
@@ -107,15 +107,15 @@ SHOT = Shot()
 KEY = Softbox((-3.3, 2.4, 0.9), (0.0, 0.4, 0.0), (1.5, 1.5), (44.0, 39.0, 33.0), 1.0)  # warm, raking
 RIM = Softbox((2.5, 2.0, -2.2), (0.0, 0.5, 0.0), (1.0, 1.8), (14.0, 18.0, 24.0), 1.0)  # cool, from behind
 LAMPS = {"key": KEY, "rim": RIM}
-SKY: Point = (0.055, 0.066, 0.085)  # radiance of the dim light from everywhere
+SKY: Point = (0.055, 0.066, 0.085)  # radiance of the dim light from all directions
 SKY_SHARE = 0.15
-FILLED = 0.80  # share of a picture that `placed` fills
+FILLED = 0.80  # share of the picture that `framing` and `placed` fill
 BACKDROP_COLOUR: Point = (0.085, 0.092, 0.105)
 BOWL_COLOUR: Point = (0.085, 0.075, 0.070)
 
 
 def raised(elevation: float) -> Camera:
-    """The camera lifted to `elevation` degrees above the horizon of its target, as far away as before."""
+    """CAMERA at `elevation` degrees above the horizon of its target, at the same distance."""
     x, y, z = CAMERA.target
     angle = float(np.radians(elevation))
     position = (x, y + CAMERA.distance * float(np.sin(angle)), z + CAMERA.distance * float(np.cos(angle)))
@@ -123,8 +123,8 @@ def raised(elevation: float) -> Camera:
 
 
 def framing(low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) -> Camera:
-    """The camera moved, looking the same way through the same lens, until a box from `low` to `high` (3,) just fills
-    the middle of a picture of `aspect`, its width over its height."""
+    """The camera translated, with the same direction and lens, until a box from `low` to `high` (3,) fills the middle
+    of a picture of `aspect`, width over height."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     right, up, ahead = camera.axes
     corners = 0.5 * (high - low) * (np.indices((2, 2, 2)).reshape(3, -1).T * 2 - 1)
@@ -136,8 +136,9 @@ def framing(low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) ->
 
 
 def in_studio(vertices: np.ndarray, camera: Camera, usual: Camera) -> tuple[np.ndarray, Camera, float]:
-    """Vertices (N, 3) and camera scaled until the camera sees as much as the `usual` one, and moved until what it looks
-    at is over x = z = 0; and the scale. So lamps and backdrop suit subjects of any size; the floor stays at y = 0."""
+    """Vertices (N, 3) and camera, scaled until the camera sees as much as the `usual` one, and translated until its
+    target is above x = z = 0; and the scale. So lamps and backdrop fit subjects of any size; the floor stays at y = 0.
+    """
     extent, usual_extent = (c.distance * float(np.tan(np.radians(c.fov) / 2)) for c in (camera, usual))
     scale = usual_extent / extent
     shift = np.array([camera.target[0], 0.0, camera.target[2]])
@@ -147,14 +148,14 @@ def in_studio(vertices: np.ndarray, camera: Camera, usual: Camera) -> tuple[np.n
 
 
 def placed(vertices: np.ndarray, low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) -> np.ndarray:
-    """Vertices (N, 3) moved and scaled so that a box from `low` to `high` (3,) fills the middle of a picture.
+    """Vertices (N, 3) translated and scaled so that a box from `low` to `high` (3,) fills the middle of a picture.
 
     aspect  width of the picture over its height
-    All frames of an animation with the same box are placed alike.
+    All frames of an animation with the same box are placed identically.
     """
     low, high = np.asarray(low, float), np.asarray(high, float)
     ahead = np.array(camera.target) - np.array(camera.position)
-    right = np.cross(ahead, [0.0, 1.0, 0.0])  # of the vector itself: `axes` rounds its last bit elsewhere
+    right = np.cross(ahead, [0.0, 1.0, 0.0])  # not `axes`, which rounds differently: pictures keep their bits
     right /= np.linalg.norm(right)
     up = np.cross(right, ahead / camera.distance)
     view = 2 * camera.distance * np.tan(np.radians(camera.fov) / 2)
@@ -165,7 +166,7 @@ def placed(vertices: np.ndarray, low: np.ndarray, high: np.ndarray, camera: Came
 
 
 def extruded(profile: np.ndarray, half_width: float) -> Mesh:
-    """The surface that a profile (N, 2) of (z, y) sweeps from x = -half_width to half_width."""
+    """The surface of a profile (N, 2) of (z, y), extruded from x = -half_width to half_width."""
     profile = np.asarray(profile, np.float32)
     count = len(profile)
     vertices = np.empty((2, count, 3), np.float32)
@@ -178,7 +179,7 @@ def extruded(profile: np.ndarray, half_width: float) -> Mesh:
 
 
 def revolved(profile: np.ndarray, segments: int = 192) -> Mesh:
-    """The surface that a profile (N, 2) of (radius, y) sweeps round the y axis, bottom outside first."""
+    """The surface of revolution of a profile (N, 2) of (radius, y) around the y axis, bottom outside first."""
     profile = np.asarray(profile, np.float32)
     count = len(profile)
     angle = np.arange(segments, dtype=np.float32) * np.float32(2.0 * np.pi / segments)
@@ -200,7 +201,7 @@ def _arc(centre: tuple[float, float], radii: tuple[float, float], start: float, 
 
 
 def backdrop() -> Mesh:
-    """A cyclorama: the floor, a wide curve, the wall; no horizon shows."""
+    """A cyclorama: floor, wide curve, wall; no horizon is visible."""
     curve = _arc((-2.2, 2.4), (2.4, 2.4), 270.0, 180.0, 48)
     return extruded(np.concatenate([[(9.0, 0.0)], curve, [(-4.6, 9.0)]]), half_width=14.0)
 
@@ -208,7 +209,7 @@ def backdrop() -> Mesh:
 def bowl(radius: float, height: float) -> Mesh:
     """A thick-walled stone bowl on a foot, open at the top: inner `radius` of its mouth, `height` of its rim.
 
-    The smoke's source lies within it, so that the plume rises out of something instead of out of a cut.
+    It hides the source of the smoke, where the plume would otherwise begin with a flat cut.
     """
     wall = 0.16 * radius
     outer = radius + wall

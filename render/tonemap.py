@@ -1,6 +1,6 @@
-"""From light to picture: the tone curve, the sRGB transfer function, and eight bits without banding.
+"""From linear light to display values: tone curve, sRGB transfer function, and eight bits without banding.
 
-Renderers return linear Rec.709 light. Nothing is toned before this module, which a figure calls last.
+Renderers return linear Rec.709 light. Nothing is tone-mapped before this module, which a figure calls last.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Curve = Literal["filmic", "straight"]
 
 
 def filmic(light: np.ndarray) -> np.ndarray:
-    """Linear light toned to [0, 1): a soft toe, a straight middle, a long shoulder that never clips.
+    """Linear light tone-mapped to [0, 1]: a soft toe, a straight middle, a long shoulder.
 
     The rational fit of the ACES reference curve by Narkowicz (2015), as published.
     """
@@ -29,24 +29,23 @@ def to_srgb(linear: np.ndarray) -> np.ndarray:
 
 
 def from_srgb(display: np.ndarray) -> np.ndarray:
-    """The inverse of `to_srgb`: the linear values that it shows as these in [0, 1]."""
+    """The inverse of `to_srgb`: the linear values of display values in [0, 1]."""
     return np.where(display <= 0.04045, display / 12.92, ((np.maximum(display, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
 def to_display(light: np.ndarray, curve: Curve) -> np.ndarray:
     """Linear light (h, w, 3) as sRGB display values (h, w, 3) float32 in [0, 1].
 
-    "filmic" for lit smoke and volumes; "straight" (no tone curve) for ink, whose paper must stay white.
+    "filmic" for rendered scenes; "straight", without a tone curve, for ink, whose paper must stay white.
     """
-    toned = filmic(light) if curve == "filmic" else light
-    return to_srgb(toned).astype(np.float32)
+    return to_srgb(filmic(light) if curve == "filmic" else light).astype(np.float32)
 
 
 def eight_bit(display: np.ndarray, seed: int = 0) -> np.ndarray:
-    """Display values (h, w, 3) in [0, 1] as uint8, dithered by triangular noise of one step each way.
+    """Display values (h, w, 3) in [0, 1] as uint8, dithered with triangular noise of plus or minus one step.
 
-    Without the noise a soft gradient shows bands. The noise depends on `seed` and shape only, so it stands
-    still in an animation. Exact black and exact white stay exact.
+    Without the noise a soft gradient would show banding. The noise depends on `seed` and shape only, so it does not
+    flicker in an animation. Exact black and exact white stay exact.
     """
     display = np.clip(display, 0.0, 1.0)
     noise = np.where((display == 0.0) | (display == 1.0), np.float32(0.0), _triangular(display.shape, seed))

@@ -14,30 +14,30 @@ def tone(value: int, height: int = 40, width: int = 60) -> np.ndarray:
 def test_panels_keep_their_pixels() -> None:
     """Bytes come back as they are; float values within the dither."""
     noise = np.random.Generator(np.random.Philox(key=1)).integers(0, 256, (40, 60, 3), dtype=np.uint8)
-    sheet = layout.figure([[Panel(noise, frame=False)]], margin=10)
-    assert sheet.shape == (60, 80, 3)
-    assert np.array_equal(sheet[10:50, 10:70], noise)
-    sheet = layout.figure([[Panel(noise / np.float32(255.0), frame=False)]], margin=10)
-    assert np.abs(sheet[10:50, 10:70].astype(int) - noise).max() <= 1
+    page = layout.figure([[Panel(noise, border=False)]], margin=10)
+    assert page.shape == (60, 80, 3)
+    assert np.array_equal(page[10:50, 10:70], noise)
+    page = layout.figure([[Panel(noise / np.float32(255.0), border=False)]], margin=10)
+    assert np.abs(page[10:50, 10:70].astype(int) - noise).max() <= 1
 
 
 def test_margin_and_gap_are_white() -> None:
-    sheet = layout.figure([[Panel(tone(0)), Panel(tone(0))]], margin=10, gap=7)
-    assert (sheet[:10] == 255).all()
-    assert (sheet[:, 70:77] == 255).all()
-    assert sheet.shape == (60, 147, 3)
+    page = layout.figure([[Panel(tone(0)), Panel(tone(0))]], margin=10, gap=7)
+    assert (page[:10] == 255).all()
+    assert (page[:, 70:77] == 255).all()
+    assert page.shape == (60, 147, 3)
 
 
-def test_panels_stand_on_one_base_line_and_under_each_other() -> None:
+def test_panels_stand_on_one_baseline_and_under_each_other() -> None:
     """Columns 30 and 60 wide; the last row has one panel only and is centred."""
     rows = [[Panel(tone(0, 20, 30)), Panel(tone(0))], [Panel(tone(0, 20, 20)), Panel(tone(0))], [Panel(tone(0))]]
-    sheet = layout.figure(rows, margin=0, gap=10)
-    assert sheet.shape == (40 + 10 + 40 + 10 + 40, 30 + 10 + 60, 3)
-    assert (sheet[:20, :30] == 255).all()
-    assert (sheet[22:38, 2:28] < 20).all()
-    assert (sheet[72:88, 7:23] < 20).all() and (sheet[72:88, :5] == 255).all()
-    assert (sheet[52:88, 42:98] < 20).all()
-    assert (sheet[102:138, 22:78] < 20).all()
+    page = layout.figure(rows, margin=0, gap=10)
+    assert page.shape == (40 + 10 + 40 + 10 + 40, 30 + 10 + 60, 3)
+    assert (page[:20, :30] == 255).all()
+    assert (page[22:38, 2:28] < 20).all()
+    assert (page[72:88, 7:23] < 20).all() and (page[72:88, :5] == 255).all()
+    assert (page[52:88, 42:98] < 20).all()
+    assert (page[102:138, 22:78] < 20).all()
 
 
 def test_labels_shrink_until_they_fit_their_panel() -> None:
@@ -54,10 +54,10 @@ def test_a_prime_stands_close_to_its_letter() -> None:
 
 
 def test_labels_are_dark_centred_and_below() -> None:
-    sheet = layout.figure([[Panel(tone(255, 40, 300), "coarse motion *L*", frame=False)]], margin=0)
-    ink = (255 - sheet[40:].astype(int)).sum(axis=(0, 2))
-    assert sheet[40:].min() < 60
-    assert (sheet[:40] == 255).all()
+    page = layout.figure([[Panel(tone(255, 40, 300), "coarse motion *L*", border=False)]], margin=0)
+    ink = (255 - page[40:].astype(int)).sum(axis=(0, 2))
+    assert page[40:].min() < 60
+    assert (page[:40] == 255).all()
     assert (ink * np.arange(300)).sum() / ink.sum() == pytest.approx(150, abs=8)
 
 
@@ -75,11 +75,11 @@ def test_lines_of_one_size_have_one_height_and_blanks_take_room() -> None:
 
 def test_inset_stands_lower_left_and_legend_lower_right() -> None:
     panel = Panel(tone(100, 200, 300), inset=tone(0, 40, 40), legend=lic.wheel(50))
-    sheet = layout.figure([[panel]], margin=0)
-    left, right = sheet[150:, :60].astype(int), sheet[150:, 240:].astype(int)
+    page = layout.figure([[panel]], margin=0)
+    left, right = page[150:, :60].astype(int), page[150:, 240:].astype(int)
     assert left.min() == 0
     assert np.ptp(right, axis=2).max() > 60
-    assert (sheet[5:140, 5:295] == 100).all()
+    assert (page[5:140, 5:295] == 100).all()
 
 
 def test_an_inset_that_does_not_fit_is_refused() -> None:

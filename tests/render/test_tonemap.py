@@ -1,4 +1,4 @@
-"""render.film: values known in advance."""
+"""render.tonemap: values known in advance."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ def test_srgb_values_of_the_standard() -> None:
     assert values == pytest.approx([0.0, 0.0, 0.0404482, 0.5, 1.0, 1.0], abs=2e-6)
 
 
-def test_filmic_never_falls_and_never_clips_below_white() -> None:
+def test_filmic_never_decreases_and_leaves_room_above_one() -> None:
     tones = tonemap.filmic(np.linspace(0.0, 10.0, 2001))
     assert tones[0] == 0.0
     assert (np.diff(tones) >= 0.0).all()
