@@ -1,4 +1,4 @@
-"""The command line: one command per stage, and what goes round them.
+"""The command line: one command per stage, and commands for what surrounds them.
 
 Exit codes: 0 done, 1 differs (diff), 2 bad input, 3 the environment lacks something, 4 storage or memory,
 130 interrupted, 143 terminated; 70 is a fault of flowloom itself, with its traceback.
@@ -46,7 +46,7 @@ Quiet = Annotated[bool, Parameter(negative="", help="No progress.")]
 FrameRange = Annotated[str | None, Parameter(help="Only these, as 1-10,20,30-40x2; the stages before must be done.")]
 
 
-def _run(verb: str, scene: Path, quick: bool, out: Path, quiet: bool, frames: str | None = None) -> None:
+def _run(stage: str, scene: Path, quick: bool, out: Path, quiet: bool, frames: str | None = None) -> None:
     from pipeline import stages
     from pipeline.frame_ranges import frames as parsed
     from pipeline.progress import Progress
@@ -54,19 +54,19 @@ def _run(verb: str, scene: Path, quick: bool, out: Path, quiet: bool, frames: st
 
     scenes = load(scene, quick)
     last = max(s.frames for s in scenes.variants.values())
-    stages.run(verb, scenes, out, Progress(quiet), parsed(frames, last) if frames is not None else None)
+    stages.run(stage, scenes, out, Progress(quiet), parsed(frames, last) if frames is not None else None)
 
 
 @app.command
 def synth(scene: SceneFile, /, *, quick: Quick = False, out: Out = OUT, quiet: Quiet = False) -> None:
-    """Synthesize the motion fields: exemplar, L and H, into OUT/X/fields."""
+    """Synthesize motion, fields or elements, into OUT/X/fields."""
     _run("synth", scene, quick, out, quiet)
 
 
 @app.command
 def bake(scene: SceneFile, /, *, frames: FrameRange = None, quick: Quick = False, out: Out = OUT,
          quiet: Quiet = False) -> None:
-    """Bake F and the density, in world units, into OUT/X/geometry."""
+    """Bake the motion into volumes, meshes and points, in world units, into OUT/X/geometry."""
     _run("bake", scene, quick, out, quiet, frames)
 
 
@@ -87,12 +87,16 @@ def figure(scene: SceneFile, /, *, quick: Quick = False, out: Out = OUT, quiet: 
 def diff(*scenes: SceneFiles, out: Out = OUT, quiet: Quiet = False) -> int:
     """Check that scenes still give, at their quick settings, what their references keep; else exit 1."""
     from pipeline import diff as checking
+    from pipeline import references as keeping
+    from pipeline import stages
     from pipeline.listing import project_scenes
     from pipeline.progress import Progress
+    from pipeline.scene import load
 
     differs = False
     for scene in scenes or project_scenes():
-        lines = checking.check(scene, out, Progress(quiet))
+        loaded, record = load(scene, quick=True), keeping.record_of(scene)
+        lines = checking.check(stages.run("bake", loaded, out, Progress(quiet)), record)
         print(*(lines or [f"{scene.stem}: the same"]), sep="\n")
         differs = differs or bool(lines)
     return int(differs)
@@ -102,11 +106,13 @@ def diff(*scenes: SceneFiles, out: Out = OUT, quiet: Quiet = False) -> int:
 def references(*scenes: SceneFiles, out: Out = OUT, quiet: Quiet = False) -> None:
     """Keep what scenes give at their quick settings as the references that `diff` compares with."""
     from pipeline import references as keeping
+    from pipeline import stages
     from pipeline.listing import project_scenes
     from pipeline.progress import Progress
+    from pipeline.scene import load
 
     for scene in scenes or project_scenes():
-        print(keeping.write(scene, out, Progress(quiet)))
+        print(keeping.write(stages.run("bake", load(scene, quick=True), out, Progress(quiet))))
 
 
 @app.command
@@ -123,6 +129,18 @@ def gallery(*, out: Out = OUT) -> None:
     from pipeline import gallery as exhibition
 
     print(exhibition.write(out))
+
+
+@app.command
+def schema(*, write: Annotated[bool, Parameter(negative="", help="Write them into the project's scenes folder.")]
+           = False) -> None:
+    """Print the JSON Schema of scenes, by which an editor completes and checks them."""
+    from pipeline import schema as page
+
+    if write:
+        page.write()
+    else:
+        print(page.json_schema())
 
 
 @app.command(name="list")

@@ -4,45 +4,29 @@ First the fields and volumes by content: the sums of every frame, all values of 
 shows. Then a small proof of that frame at the scene's seed. Content comes first because pictures forgive: one
 per cent more smoke is far below what a threshold on the mean FLIP notices.
 
-A difference that is meant becomes the new reference by `flowloom references`; look at the report before.
+A difference that is intended becomes the new reference by `flowloom references`; look at the report before.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pipeline import references, stages
+from pipeline import diff_report, references
+from pipeline.build.graph import BuildGraph
+from pipeline.diff_report import Finding
 from pipeline.files import images
-from pipeline.progress import Progress
-from pipeline.scene import load
 
 SUM_TOLERANCE = 1e-6  # of a frame's sums, relative to the sum of its absolute values
 VALUE_TOLERANCE = 1e-5  # of any value, relative to the frame's largest
 PIXEL_TOLERANCE = 1e-3  # of a pixel, relative to its reference
 PIXEL_FLOOR = 1e-2  # a pixel darker than this share of the picture's mean counts as that bright
 PIXEL_SHARE = 1e-3  # of the pixels may differ by more: another SIMD width changes up to 2 of 9,216
-
-
-@dataclass(frozen=True)
-class Finding:
-    """The outcome of one comparison.
-
-    fault: what differs, "" if nothing; measured: how far apart they are, either way; old, new: the arrays
-    compared, where there is something to look at; is_light: whether they are linear light.
-    """
-
-    name: str
-    fault: str
-    measured: str = ""
-    old: np.ndarray | None = None
-    new: np.ndarray | None = None
-    is_light: bool = False
 
 
 def compared_sums(name: str, new: dict[str, Any], old: dict[str, Any]) -> Finding:
@@ -83,39 +67,32 @@ def compared_light(name: str, new: np.ndarray, old: np.ndarray) -> Finding:
     return Finding(name, fault, measured, old, new, is_light=True)
 
 
-def check(scene_file: Path, out: Path, progress: Progress) -> list[str]:
-    """Run a scene at its [quick] settings and compare; one line per product that differs, none if none does.
-
-    Writes the report out/quick/X/diff/index.html with its picture. Raises BadInput if there is no reference,
-    and what the stages raise.
+def check(graph: BuildGraph, record: dict[str, Any]) -> list[str]:
+    """Compare a scene, whose graph is baked at its [quick] settings, with the `record` of its reference; one line per
+    artifact that differs, none if none does. Writes the report out/quick/X/diff/index.html with its picture.
     """
-    from pipeline import diff_report
-
-    load(scene_file, quick=True)  # a scene that is not there lacks more than a reference
-    record = references.record_of(scene_file)
-    works = references.baked(scene_file, out, progress)
-    found = list(findings(works, references.folder_of(scene_file), record))
-    page = diff_report.write(scene_file.stem, found, works.root / "diff")
-    lines = [f"{scene_file.stem}: {line}" for line in _first_of_each([f for f in found if f.fault])]
+    found = list(findings(graph, references.folder_of(graph.file_of_scene), record))
+    page = diff_report.write(graph.name, found, graph.root / "diff")
+    lines = [f"{graph.name}: {line}" for line in _first_of_each([f for f in found if f.fault])]
     if lines:
-        meant = f"if it is meant, type: flowloom references {scene_file}"
-        lines.append(f"{scene_file.stem}: look at {page}; {meant}")
+        lines.append(f"{graph.name}: look at {page}; if the change is intended, type: "
+                     f"flowloom references {graph.file_of_scene}")
     return lines
 
 
 def _first_of_each(faults: list[Finding]) -> Iterator[str]:
     """One line for each product: its first frame that differs, and how many more do."""
-    products: dict[str, list[Finding]] = {}
+    artifacts: dict[str, list[Finding]] = {}
     for fault in faults:
-        products.setdefault(re.sub(r"\.\d{4,}\.", ".", fault.name), []).append(fault)
-    for first, *more in products.values():
+        artifacts.setdefault(re.sub(r"\.\d{4,}\.", ".", fault.name), []).append(fault)
+    for first, *more in artifacts.values():
         yield f"{first.name}: {first.fault}" + (f"; so do {len(more)} more frames" if more else "")
 
 
-def findings(works: stages.Works, folder: Path, record: dict[str, Any]) -> Iterator[Finding]:
+def findings(graph: BuildGraph, folder: Path, record: dict[str, Any]) -> Iterator[Finding]:
     """All comparisons with the reference in `folder`: content first, then the proofs."""
     left = {**record["sums"], **record["proofs"]}
-    for made in references.contents(works):
+    for made in references.contents(graph):
         old = left.pop(made.path, None)
         if old is None:
             yield Finding(made.path, "is new; the reference does not have it")
@@ -123,7 +100,7 @@ def findings(works: stages.Works, folder: Path, record: dict[str, Any]) -> Itera
             yield compared_values(made.path, made.values(made.file), made.values(folder / made.path))
         else:
             yield compared_sums(made.path, references.sums(made.values(made.file)), old)
-    for proof in references.proofs(works):
+    for proof in references.proofs(graph):
         old = left.pop(proof.path, None)
         if old is None:
             yield Finding(proof.path, "is new; the reference does not have it")

@@ -1,23 +1,20 @@
 """What a `flowloom diff` found, to look at: reference, now, difference and FLIP, as a page and a picture.
 
 FLIP (Andersson et al. 2021) tells where an observer who flips between the two sees a change, from 0 to 1. It
-is evidence for the eye only: the verdict is by content and by pixels (`pipeline.diff`).
+is for the eye only: the verdict is by content and by pixels (`pipeline.diff`).
 """
 
 from __future__ import annotations
 
 import html
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipeline.files import atomic, pictures
 from render import layout, lic, tonemap
-
-if TYPE_CHECKING:
-    from pipeline.diff import Finding
 
 WIDTH = 320  # pixels of a panel
 PAGE, PICTURE = "index.html", "diff.png"
@@ -26,6 +23,22 @@ body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 90rem
 img { max-width: 100% } td, th { text-align: left; padding: .15rem 1rem .15rem 0; vertical-align: top }
 .differs { color: #b00020; font-weight: 600 } .same { color: #1b6e3a }
 """
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The outcome of one comparison.
+
+    fault: what differs, "" if nothing; measured: how far apart they are, either way; old, new: the arrays
+    compared, where there is something to look at; is_light: whether they are linear light.
+    """
+
+    name: str
+    fault: str
+    measured: str = ""
+    old: np.ndarray | None = None
+    new: np.ndarray | None = None
+    is_light: bool = False
 
 
 def write(scene: str, findings: Sequence[Finding], folder: Path) -> Path:

@@ -27,8 +27,8 @@ class BadInput(FlowloomError):
         super().__init__(": ".join(str(part) for part in (file, key, reason) if str(part)))
 
 
-class WrongValue(ValueError):
-    """A value of a scene that does not do, as shows when something is made of it: its dotted key, and the reason."""
+class InvalidValue(ValueError):
+    """A value of a scene that a method refuses: its dotted key, and the reason."""
 
     def __init__(self, key: str, reason: str):
         self.key = key
@@ -36,14 +36,14 @@ class WrongValue(ValueError):
 
 
 @contextmanager
-def blaming(key: str) -> Iterator[None]:
-    """What the methods refuse with ValueError is the fault of this key of the scene."""
+def attributed_to(key: str) -> Iterator[None]:
+    """A ValueError inside is an InvalidValue of this key of the scene."""
     try:
         yield
-    except WrongValue:
+    except InvalidValue:
         raise
     except ValueError as error:
-        raise WrongValue(key, str(error)) from error
+        raise InvalidValue(key, str(error)) from error
 
 
 class EnvironmentMissing(FlowloomError):

@@ -8,7 +8,7 @@ from pathlib import Path
 from pipeline.errors import BadInput
 from pipeline.files import atomic
 from pipeline.scene import load
-from pipeline.schema import PROJECT_SCENES
+from pipeline.tables import PROJECT_SCENES
 
 PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>flowloom</title>

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.errors import BadInput
 from pipeline.scene import load
-from pipeline.schema import PROJECT_SCENES
+from pipeline.tables import PROJECT_SCENES
 
 
 def project_scenes() -> list[Path]:

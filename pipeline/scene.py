@@ -12,11 +12,10 @@ from __future__ import annotations
 import copy
 import difflib
 import functools
-import math
+import itertools
 import re
 import tomllib
-import unicodedata
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -24,14 +23,13 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from pipeline.elements_schema import ElementsScene, TracksExemplar, TracksMotion
+from pipeline.build.graph import folder_name
+from pipeline.build.method import Faults, Method
+from pipeline.build.view import value_at
 from pipeline.errors import BadInput
-from pipeline.product import Scene as AnyScene
-from pipeline.schema import Scene, ShapeObstacle, View, is_of_exemplar
+from pipeline.methods import METHODS
 
 Raw = Mapping[str, Any]
-FLAT = ("lit", "ink", "particles")  # kinds of [render] that draw a plane
-MOST_APART = 4  # at most so much larger is an exemplar than another: at the coarsest level a 9² neighbourhood sees both
 WORDS = (  # pydantic's for ours
     ("Input should", "should"),
     ("a valid dictionary or object to extract fields from", "a table"),
@@ -49,7 +47,8 @@ class Scenes:
 
     file: Path
     quick: bool
-    variants: dict[str, AnyScene]
+    method: Method
+    variants: dict[str, Any]
 
     @property
     def name(self) -> str:
@@ -75,14 +74,17 @@ def load(file: Path, quick: bool = False) -> Scenes:
     }
     _check_folder_names(file, list(variants))
 
-    base = _validated(file, raw)
-    quick_base = _validated(file, raw, quick_table)
+    method = _method(raw)
+    base = _validated(file, method, raw)
+    quick_base = _validated(file, method, raw, quick_table)
     if not variants:
-        return Scenes(file, quick, {"": quick_base if quick else base})
+        return Scenes(file, quick, method, {"": quick_base if quick else base})
     # a variant wins over [quick]: it is what the figure compares
-    full = {name: _validated(file, raw, variant) for name, variant in variants.items()}
-    quickened = {name: _validated(file, raw, quick_table, variant) for name, variant in variants.items()}
-    return Scenes(file, quick, quickened if quick else full)
+    full = {name: _validated(file, method, raw, variant) for name, variant in variants.items()}
+    quickened = {name: _validated(file, method, raw, quick_table, variant) for name, variant in variants.items()}
+    for scenes in (full, quickened):
+        _require_one_figure(file, scenes)
+    return Scenes(file, quick, method, quickened if quick else full)
 
 
 def _read(file: Path) -> dict[str, Any]:
@@ -96,12 +98,6 @@ def _read(file: Path) -> dict[str, Any]:
         raise BadInput(file, "", f"cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise BadInput(file, "", f"is not TOML: {error}") from error
-
-
-def folder_name(name: str) -> str:
-    """The folder of a variant: "ω = 15" is kept in omega-15."""
-    greek = (unicodedata.name(c, "").split()[-1] if "GREEK" in unicodedata.name(c, "") else c for c in name)
-    return re.sub(r"[^a-z0-9.]+", "-", "".join(greek).lower()).strip("-.")
 
 
 def _check_folder_names(file: Path, variants: list[str]) -> None:
@@ -134,15 +130,15 @@ def _overridden(file: Path, raw: Raw, overrides: Overrides) -> dict[str, Any]:
     return result
 
 
-def _validated(file: Path, raw: Raw, *overrides: Overrides) -> AnyScene:
+def _validated(file: Path, method: Method, raw: Raw, *overrides: Overrides) -> Any:
     """The scene of `raw` under `overrides`, the last one winning; BadInput blames the override if it was one."""
     for table in overrides:
         raw = _overridden(file, raw, table)
     try:
-        scene = _kind(raw).model_validate(raw, context={"folder": file.parent})
-        key, reason = _fault_between_tables(scene)
+        scene = method.scene.model_validate(raw, context={"folder": file.parent})
+        key, reason = _fault_between_tables(method, scene)
     except ValidationError as error:
-        key, reason = _first_fault(raw, error)
+        key, reason = _first_fault(method.scene, raw, error)
     if not reason:
         return scene
     for table in reversed(overrides):
@@ -154,18 +150,18 @@ def _validated(file: Path, raw: Raw, *overrides: Overrides) -> AnyScene:
     raise BadInput(file, f"{overrides[-1].where}: {key}" if overrides else key, reason)
 
 
-def _kind(raw: Raw) -> type[Scene] | type[ElementsScene]:
-    """What kind of scene a file is."""
-    return ElementsScene if "elements" in raw else Scene
+def _method(raw: Raw) -> Method:
+    """The method of a scene: that of the first of the methods' tables that it has."""
+    return next((method for method in METHODS[1:] if method.table in raw), METHODS[0])
 
 
-def _first_fault(raw: Raw, error: ValidationError) -> tuple[str, str]:
+def _first_fault(scene: type[BaseModel], raw: Raw, error: ValidationError) -> tuple[str, str]:
     """Dotted key and reason of one fault: a misspelt key first, for it is often why another is missing."""
     faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     fault = faults[0]
     key = ""
     table: Any = raw
-    model: type[BaseModel] = _kind(raw)
+    model = scene
     field: FieldInfo | None = None
     for part in fault["loc"]:
         if isinstance(part, int):
@@ -225,240 +221,36 @@ def _did_you_mean(given: str, known: Any) -> str:
     return f"; did you mean {close[0]}?" if close else f"; known: {', '.join(known)}"
 
 
-def _fault_between_tables(scene: AnyScene) -> tuple[str, str]:
+def _fault_between_tables(method: Method, scene: Any) -> tuple[str, str]:
     """Dotted key and reason of values that are fine each and impossible together; ("", "") if all is well."""
-    checks: Sequence[Callable[[Any], Faults]] = (
-        (_grids, _flat_and_deep, _exemplar, _views, _obstacles, _shown) if isinstance(scene, Scene) else
-        (_element_kinds, _element_places, _grids, _obstacles, _shown))
-    for faults in checks:
-        for key, reason in faults(scene):
-            return key, reason
-    return "", ""
+    faults = itertools.chain(*(check(scene) for check in method.checks), _figure_fits(method, scene))
+    return next(faults, ("", ""))
 
 
-Faults = Iterator[tuple[str, str]]
-
-
-def _flat_and_deep(scene: Scene) -> Faults:
-    """What is for a field in the plane and what is for one in space."""
-    detail, density, render = scene.detail, scene.density, scene.render
-    size = _sized(detail.size)
-    if scene.dimension == 2:
-        need = f"needs a field in space; detail.size is {size}"
-        if scene.views:
-            yield "views", need
-        if detail.facing != "camera":
-            yield "detail.facing", need
-        if scene.figure.plane != "front":
-            yield "figure.plane", need
-        for number, source in enumerate(density.sources):
-            if len(source.centre) != 2:
-                yield f"density.sources[{number}].centre", need
-        if render.kind == "seaweed":
-            yield "render.kind", f'"seaweed" {need}'
-        if (density.depth is not None) != (render.kind == "volume") and render.kind != "none":
-            need = "needs a [density.depth]" if render.kind == "volume" else "draws no volume, but density.depth is"
-            yield "render.kind", f'"{render.kind}" {need}'
-    else:
-        if density.depth is not None:
-            yield "density.depth", f"gives a plane a body; detail.size is {size}, which has one"
-        for name, default in (("synthesize", "motion"), ("samples", "grid")):
-            chosen = getattr(detail, name)
-            if chosen != default:
-                yield f"detail.{name}", f'"{chosen}" is for a field in the plane; detail.size is {size}'
-        if render.kind in FLAT:
-            yield "render.kind", f'"{render.kind}" draws a plane; detail.size is {size}'
-    if detail.samples == "lagrangian":
-        if detail.search != "exact":
-            yield "detail.search", "samples that move have no fixed neighbours for k-coherence to ask: say exact"
-        if detail.synthesize != "motion":
-            yield "detail.synthesize", "the potential is synthesized on the grid only"
-    if (detail.facing == "directions") != bool(detail.directions):
-        yield "detail.directions", ("is missing, for facing = \"directions\"" if not detail.directions else
-                                    f"is not used with facing = \"{detail.facing}\"")
-    for number, direction in enumerate(detail.directions):
-        if not any(direction.vector):
-            yield f"detail.directions[{number}].vector", "is zero: it faces nowhere"
-        if direction.at in [other.at for other in detail.directions[:number]]:
-            yield f"detail.directions[{number}].at", "is the place of one before it"
-
-
-def _exemplar(scene: Scene) -> Faults:
-    """The exemplar of a field in the plane."""
-    if scene.dimension == 3:
-        return
-    size, levels = scene.exemplar.size, scene.detail.levels
-    if size > min(scene.detail.size):
-        yield "exemplar.size", f"an exemplar of {size}² is larger than the output ({_sized(scene.detail.size)})"
-    if isinstance(levels, int) and size >> (levels - 1) < 4:
-        yield "detail.levels", f"{levels} levels bring an exemplar of {size}² below 4 cells"
-
-
-def _views(scene: Scene) -> Faults:
-    """The views of a field in space (§3.2): whole, of one scale, smaller than the output, and enough of them."""
-    if scene.dimension == 2:
-        return
-    smallest = min(_exemplar_of(view).size for view in scene.seen)
-    for number, view in enumerate(scene.seen):
-        exemplar, where = _exemplar_of(view), f"views[{number}]"
-        if not view.plane and not (view.right and view.up):
-            yield where, "needs a plane, or both right and up"
-            return
-        if view.plane and (view.right or view.up):
-            yield f"{where}.plane", "says what right and up say too: leave one out"
-        if _parallel(*view.axes):
-            yield f"{where}.up", "is parallel to right, or one of them is zero: they span no plane"
-        spanned = [n for n, *along in zip(scene.detail.size, *view.axes, strict=True) if any(along) or view.solid]
-        size, power = exemplar.size, "³" if view.solid else "²"
-        key = f"{where}.exemplar.size" if scene.views and scene.views[number].exemplar else "exemplar.size"
-        if size > min(spanned):
-            output = _sized(scene.detail.size)
-            yield key, f"an exemplar of {size}{power} is larger than the output ({output}) along an axis of its view"
-        if size > MOST_APART * smallest:
-            yield key, f"an exemplar of {size}{power} beside one of {smallest}²: at most {MOST_APART} times as large"
-    blind = not any(view.solid for view in scene.seen) and _unseen([a for view in scene.seen for a in view.axes])
-    if blind:
-        yield "views", f"do not span space: none of them shows {blind}"
-    levels = scene.detail.levels
-    if isinstance(levels, int) and smallest >> (levels - 1) < 4:
-        yield "detail.levels", f"{levels} levels bring an exemplar of {smallest}² below 4 cells"
-
-
-def _exemplar_of(view: View) -> Any:
-    return view.exemplar
-
-
-def _parallel(a: Sequence[float], b: Sequence[float]) -> bool:
-    """Whether two vectors of space span no plane to speak of."""
-    cross = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-    return math.hypot(*cross) <= 1e-3 * math.hypot(*a) * math.hypot(*b)
-
-
-def _unseen(vectors: Sequence[Sequence[float]]) -> str:
-    """The direction that all vectors, of which two span a plane, are perpendicular to; "" if they span space."""
-    a = vectors[0]
-    b = next(v for v in vectors if not _parallel(a, v))
-    normal = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-    unit = [n / math.hypot(*normal) for n in normal]
-    for v in vectors:
-        if abs(sum(n * c for n, c in zip(unit, v, strict=True))) > 1e-3 * math.hypot(*v):
-            return ""
-    axis = next((name for name, n in zip("xyz", unit, strict=True) if abs(n) > 0.995), "")
-    return (axis or "(" + ", ".join(f"{n:.2g}" for n in unit) + ")") + " of the local frame"
-
-
-def _grids(scene: AnyScene) -> Faults:
-    """Grids that have to fit each other."""
-    cells, coarse = scene.cells, getattr(scene.coarse, "size", None)
-    if coarse is None:
-        return
-    where = scene.cells_key
-    if len(coarse) != len(cells):
-        yield "coarse.size", f"{_sized(coarse)} has not as many axes as {where}, {_sized(cells)}"
-    elif any(n * coarse[1] != cells[1] * m for n, m in zip(cells, coarse, strict=True)):
-        yield where, f"{_sized(cells)} has not the shape of coarse.size, {_sized(coarse)}"
-
-
-def _obstacles(scene: AnyScene) -> Faults:
-    """The obstacles, and the stone that a wake needs."""
-    for number, obstacle in enumerate(scene.obstacles):
-        if not isinstance(obstacle, ShapeObstacle):
-            continue
-        yield from _of_dimension(scene, obstacle, f"obstacles[{number}]")
-    if isinstance(scene, Scene) and scene.obstacles and scene.detail.boundary and scene.detail.samples == "lagrangian":
-        yield "detail.samples", "samples that move do not observe a boundary: say boundary = false"
-    if scene.coarse is not None and scene.coarse.kind == "wake":
-        if scene.dimension == 3:
-            yield "coarse.kind", f'"wake" is a flow of the plane; {scene.cells_key} is {_sized(scene.cells)}'
-        if scene.stone is None:
-            yield "coarse.kind", '"wake" needs a stone, an [[obstacles]] with kind = "ball"'
-        if len(scene.coarse.lengths) != len(scene.coarse.gains):
-            yield "coarse.gains", f"{len(scene.coarse.gains)} gains for {len(scene.coarse.lengths)} lengths"
-
-
-def _of_dimension(scene: AnyScene, shape: ShapeObstacle, key: str) -> Faults:
-    if len(shape.centre) != scene.dimension:
-        yield f"{key}.centre", f"has {len(shape.centre)} coordinates; {scene.cells_key} is {_sized(scene.cells)}"
-    if len(shape.radius) not in (1, scene.dimension if shape.kind == "box" else 1):
-        yield f"{key}.radius", f"has {len(shape.radius)} numbers for a {shape.kind}"
-
-
-def _shown(scene: AnyScene) -> Faults:
+def _figure_fits(method: Method, scene: Any) -> Faults:
     """What the figure shows."""
     figure = scene.figure
     if figure.frame > scene.frames:
         yield "figure.frame", f"the animation has {scene.frames} frames"
-    panels = sum(len(scene.exemplars) if is_of_exemplar(panel) else 1 for panel in figure.panels)
+    panels = len(method.panels(scene))
     if figure.labels and len(figure.labels) != panels:
         yield "figure.labels", f"{len(figure.labels)} labels for {panels} panels"
-    if "result" in figure.panels and scene.render.kind == "none":
-        yield "figure.panels", 'there is no "result" with render.kind = "none"'
-    if "coarse" in figure.panels and scene.coarse is None:
-        yield "figure.panels", 'there is no "coarse" without a [coarse]'
 
 
-LOOKS = {"noodles": ("noodles",), "paper": ("paper",), "school": ("school",),
-         "tracks": ("beads", "school", "noodles", "paper")}
-"""The [render] kinds that draw an exemplar of elements: "beads" those that are not here."""
-CARRIED = {"noodles": ("lifted", "tracks"), "paper": ("gust", "tracks")}
-"""The kinds of [coarse] that threads and sheets have, by their [render] kind."""
+ONE_FIGURE = ("fps", "figure.frame", "figure.animation", "figure.columns")
+"""What the one still and the one animation of a file have once, however many variants they show."""
 
 
-def _element_kinds(scene: ElementsScene) -> Faults:
-    """Exemplar, coarse motion and picture of one topology, in a domain of the exemplar's dimension."""
-    exemplar, coarse, render = scene.exemplar, scene.coarse, scene.render.kind
-    looks = LOOKS.get(exemplar.kind, ("beads",))
-    if render not in looks:
-        yield "render.kind", f'"{render}" draws no {exemplar.kind}: say "{looks[0]}"'
-    if isinstance(exemplar, TracksExemplar) and exemplar.captured and render not in ("beads", "school"):
-        yield "exemplar.captured", f'is for points, not for {render}'
-    if render != "beads" and scene.frames < 2:
-        yield "frames", f"an animation of {render} has 2 or more, not {scene.frames}"
-    if render in CARRIED:
-        if coarse is None or coarse.kind not in CARRIED[render]:
-            yield "coarse" if coarse is None else "coarse.kind", f'of {render} is one of {", ".join(CARRIED[render])}'
-        yield from _for_points_alone(scene, render)
-        return
-    if coarse is not None and not scene.flows:
-        yield "coarse.kind", f'"{coarse.kind}" carries threads or sheets, no {render}'
-    if scene.dimension != (2 if render == "beads" else 3):
-        yield "elements.size", f"is {_sized(scene.cells)}; " + (
-            "beads lie in the plane" if render == "beads" else f"{render} is in space: it takes a third number")
+def _require_one_figure(file: Path, scenes: Mapping[str, Any]) -> None:
+    """Refuse variants that want the one figure of the file in two ways."""
+    first, *others = scenes.items()
+    for name, scene in others:
+        for key in ONE_FIGURE:
+            mine, theirs = value_at(scene, key), value_at(first[1], key)
+            if mine != theirs:
+                raise BadInput(file, f'variants."{name}"."{key}"', f"is {_spelled(mine)}, and {_spelled(theirs)} in "
+                               f'variants."{first[0]}": a file has one figure')
 
 
-def _for_points_alone(scene: ElementsScene, render: str) -> Faults:
-    """Keys that threads and sheets do not heed, which are where their coarse motion is."""
-    wanted, reason = scene.elements, f"is for points; {render} go where their [coarse] is"
-    heeded = {"elements.domain": wanted.domain, "elements.toroidal": wanted.toroidal, "elements.pins": wanted.pins,
-              "elements.selections": wanted.selections, "elements.control": wanted.control,
-              "obstacles": scene.obstacles}
-    yield from ((key, reason) for key, value in heeded.items() if value)
-    if wanted.along != "exemplar":
-        yield "elements.along", reason
-    if isinstance(scene.coarse, TracksMotion) and wanted.count:
-        yield "elements.count", "is that of coarse.file"
-    if scene.synthesis.sequence == "frames":
-        yield "synthesis.sequence", f'"frames" is for points; of {render} all frames are synthesized together'
-
-
-def _element_places(scene: ElementsScene) -> Faults:
-    """Domain, hard positions and sequence."""
-    wanted, synthesis = scene.elements, scene.synthesis
-    if isinstance(wanted.domain, ShapeObstacle):
-        yield from _of_dimension(scene, wanted.domain, "elements.domain")
-    for number, pin in enumerate(wanted.pins):
-        if len(pin.at) != scene.dimension:
-            yield (f"elements.pins[{number}].at",
-                   f"has {len(pin.at)} coordinates; elements.size is {_sized(scene.cells)}")
-        if pin.frame > scene.frames:
-            yield f"elements.pins[{number}].frame", f"the animation has {scene.frames} frames"
-    if synthesis.sequence == "frames" and synthesis.after:
-        yield "synthesis.after", 'is 0 with sequence = "frames": later frames are not there yet (figure 3)'
-    if synthesis.sequence == "frames" and scene.coarse is not None and not scene.flows:
-        yield "synthesis.sequence", 'of threads and sheets is "together": their coarse motion is known for all frames'
-    if wanted.along == "flow" and not scene.flows:
-        yield "elements.along", '"flow" needs a [coarse] that is a field'
-
-def _sized(size: Sequence[int]) -> str:
-    """A size as the user reads it: 96×128×96."""
-    return "×".join(map(str, size))
+def _spelled(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"

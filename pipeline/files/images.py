@@ -15,6 +15,7 @@ import numpy as np
 
 from pipeline.errors import BadInput, StorageFailed
 from pipeline.files import atomic, sandbox
+from pipeline.files.format import Format
 from synth.field import Field
 
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # red, green, blue, white: x, y
@@ -155,3 +156,8 @@ def _field(path: Path, key: str, found: dict[str, Any]) -> Field:
         return Field.centred(values[::-1], 2)
     except ValueError as error:
         raise BadInput(path, key, str(error)) from error
+
+
+FIELD = Format("exr", write_field, read_field)
+LIGHT = Format("exr", write_picture, read_picture, {"half": True})
+"""Linear pictures (h, w, 3), in half floats."""

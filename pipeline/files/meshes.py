@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.errors import BadInput, StorageFailed
 from pipeline.files import atomic, sandbox
+from pipeline.files.format import Format
 
 
 def write(path: Path, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray | None = None) -> None:
@@ -174,3 +175,19 @@ def _corners(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
     """First corners of the triangles, and the cross products of the two others: for the volume."""
     a, b, c = mesh.triangles.transpose(1, 0, 2)
     return a, np.cross(b, c)
+
+
+Mesh = dict[str, np.ndarray]
+"""A mesh by the names of the arguments of `write`; points by "position" and the names of their attributes."""
+
+
+def _write_mesh(path: Path, mesh: Mesh) -> None:
+    write(path, **mesh)
+
+
+def _write_points(path: Path, points: Mesh) -> None:
+    write_points(path, points["position"], {name: values for name, values in points.items() if name != "position"})
+
+
+MESH = Format("ply", _write_mesh, read_own)
+POINTS = Format("ply", _write_points, read_points)

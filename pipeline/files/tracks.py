@@ -36,6 +36,7 @@ import numpy as np
 
 from pipeline.errors import BadInput, StorageFailed
 from pipeline.files import atomic, polygons, sandbox, usd
+from pipeline.files.format import Format
 from synth.elements.samples import Elements
 
 TABLES = ("csv", "tsv", "txt")
@@ -388,3 +389,13 @@ def _samples(found: Iterable[tuple[int, ...]],
             raise ValueError(f"element {element} has {' x '.join(map(str, other))} samples, element {first} has "
                              f"{' x '.join(map(str, grid))}")
     return list(elements.values()), grid
+
+
+def _write_with_energy(path: Path, output: tuple[Elements, np.ndarray]) -> None:
+    """Elements, and beside their tracks the array `energy`."""
+    write(path, output[0], energy=output[1])
+
+
+TRACKS = Format("npz", write, read)
+OUTPUT = Format("npz", _write_with_energy, read)
+"""Written as (elements, energy after each search), read as the elements."""

@@ -25,6 +25,7 @@ import numpy as np
 
 from pipeline.errors import StorageFailed
 from pipeline.files import atomic
+from pipeline.files.format import Format
 from synth.elements.samples import Elements
 
 FORMATS = ("usdc", "usda", "usd")
@@ -389,3 +390,11 @@ def _one(prim: Any, kind: str, times: list[float]) -> tuple[np.ndarray, list[tup
     if len(indices) and (indices.min() < 0 or indices.max() >= len(points[0])):
         raise ValueError(f"{prim.GetPath()} names a vertex that does not exist")
     return np.stack(points), [tuple(part.tolist()) for part in np.split(indices, np.cumsum(counts)[:-1])]
+
+
+def _write_animation(path: Path, animation: tuple[Elements, Callable[[int], Mapping[str, Surface]] | None]) -> None:
+    """Elements and their surfaces, as `write` takes them."""
+    write(path, *animation)
+
+
+ANIMATION = Format("usdc", _write_animation, Path.read_bytes)

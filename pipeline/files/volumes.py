@@ -20,6 +20,7 @@ import numpy as np
 
 from pipeline.errors import BadInput, StorageFailed
 from pipeline.files import atomic, sandbox
+from pipeline.files.format import Format
 from synth.field import Field
 
 SHAPE = "flowloom_shape"  # grid metadata: cells along x, y, z
@@ -197,3 +198,22 @@ def _placement(matrix: list[float]) -> tuple[float, list[float]]:
 
 def _field(grid: dict[str, Any]) -> Field:
     return Field(grid["values"], grid["voxel_size"], tuple(grid["origin"]))
+
+
+def write_field(path: Path, field: Field, *, metadata: Mapping[str, str] | None = None) -> None:
+    """Write one field: grid `vel` of vectors, `density` of scalars."""
+    write(path, {"vel" if field.is_vector else "density": field}, metadata=metadata)
+
+
+def write_level_set(path: Path, distance: Field) -> None:
+    """Write a signed distance as grid `surface`."""
+    write(path, {"surface": distance}, level_set=True)
+
+
+def read_field(path: Path) -> Field:
+    """The one field of a file that `write_field` or `write_level_set` wrote."""
+    (field,) = read(path).values()
+    return field
+
+
+LEVEL_SET_FIELD = Format("vdb", write_level_set, read_field)

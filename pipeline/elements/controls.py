@@ -1,22 +1,24 @@
-"""What guides an output of points (ma13 §4.1): its domain, flow, orientation, maps and hard positions, out of a scene.
+"""The user controls of an output of points (ma13 §4.1): its domain, flow, orientation, maps and hard positions.
 
-Lengths are heights of the domain; frames count from 0. A guide that the scene does not have is None.
+Lengths are heights of the domain; frames count from 0. A control that the scene does not have is None.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipeline import obstacles
-from pipeline.elements_schema import MOST, ElementsScene
-from pipeline.errors import WrongValue, blaming
+from pipeline.build.artifact import Inputs
+from pipeline.errors import InvalidValue, attributed_to
 from pipeline.files import pictures
-from pipeline.product import Stock
 from synth.elements.samples import Elements
 from synth.field import domain_origin
 
+if TYPE_CHECKING:
+    from pipeline.elements.scene import ElementsScene
+
+MOST = 100_000  # elements of an output
 CROWDED = 0.6  # spacings: an output whose elements cannot be farther apart than that holds too many
 
 
@@ -24,12 +26,12 @@ def require_room(scene: ElementsScene, region: Any, count: int) -> None:
     """Raise for an output that is over-constrained: more elements than the domain holds, more hard positions than
     elements, or one that lies outside."""
     if count > MOST:
-        raise WrongValue("elements.spacing", f"{count:,} elements would fill the domain; {MOST:,} are the most")
+        raise InvalidValue("elements.spacing", f"{count:,} elements would fill the domain; {MOST:,} are the most")
     room = float((region.inside > 0).sum()) * region.cell**scene.dimension
     # of the densest packing, in the plane or in space
     most = room / ((CROWDED * scene.elements.spacing) ** scene.dimension * (0.866 if scene.dimension == 2 else 0.707))
     if count > most:
-        raise WrongValue("elements.count", f"{count:,} elements are more than the domain holds: "
+        raise InvalidValue("elements.count", f"{count:,} elements are more than the domain holds: "
                                            f"{int(most):,} would be {CROWDED:g} spacings apart")
     pinned: dict[int, int] = {}
     for number, pin in enumerate(scene.elements.pins):
@@ -37,10 +39,10 @@ def require_room(scene: ElementsScene, region: Any, count: int) -> None:
         cells = (np.array(pin.at) - region.origin) / region.cell
         beyond = (cells < -0.5) | (cells > np.array(scene.cells) - 0.5)  # the distance is not known there
         if beyond.any() or region.distance(np.array([pin.at]))[0] < 0:
-            raise WrongValue(f"elements.pins[{number}].at", "is outside the domain, or in an obstacle")
+            raise InvalidValue(f"elements.pins[{number}].at", "is outside the domain, or in an obstacle")
     frame = max(pinned, key=lambda f: pinned[f], default=0)
     if frame and pinned[frame] > count:
-        raise WrongValue("elements.pins", f"{pinned[frame]} hard positions in frame {frame}, and {count} elements")
+        raise InvalidValue("elements.pins", f"{pinned[frame]} hard positions in frame {frame}, and {count} elements")
 
 
 def toroidal(scene: ElementsScene) -> np.ndarray | None:
@@ -50,7 +52,7 @@ def toroidal(scene: ElementsScene) -> np.ndarray | None:
     return np.array([scene.cells[0] / scene.cells[1], *[0.0] * (scene.dimension - 1)])
 
 
-def domain(scene: ElementsScene, stock: Stock) -> Any:
+def domain(scene: ElementsScene, inputs: Inputs) -> Any:
     """Where elements may be: the domain's rectangle and the shape in it, less the obstacles; heights."""
     from synth.elements.constraints import Domain
 
@@ -65,24 +67,27 @@ def domain(scene: ElementsScene, stock: Stock) -> Any:
             [-1 if n == axis else 1 for n in range(scene.dimension)]))
     if scene.elements.domain is not None:
         inside = np.minimum(inside, -shaped(scene) * cell)
-    if scene.obstacles:
-        inside = np.minimum(inside, stock.read("solid").values)
+    if "solid" in inputs:
+        inside = np.minimum(inside, inputs.read("solid").values)
     if not (inside > 0).any():
-        raise WrongValue("obstacles" if scene.obstacles else "elements.domain", "leave elements no room"
-                         if scene.obstacles else "is smaller than a cell of elements.size")
+        if "solid" in inputs:
+            raise InvalidValue("obstacles", "leave elements no room")
+        raise InvalidValue("elements.domain", "is smaller than a cell of elements.size")
     return Domain(inside.astype(np.float32), cell, origin, toroidal(scene))
 
 
 def shaped(scene: ElementsScene) -> np.ndarray:
     """The signed distance to the border of the domain's shape, cells, negative inside."""
-    with blaming("elements.domain"):
-        return obstacles.solid(scene, scene.elements.domain, "elements.domain").distance
+    table: Any = scene.elements.domain
+    with attributed_to("elements.domain"):
+        found: np.ndarray = table.solid(scene.shape, "elements.domain").distance
+        return found
 
 
-def flow(scene: ElementsScene, stock: Stock, region: Any) -> Any:
+def flow(scene: ElementsScene, inputs: Inputs, region: Any) -> Any:
     """How far points are carried from a frame to the next, heights; None without a flow. Nothing flows out of a domain
     that has a shape."""
-    if not scene.flows:
+    if "L" not in inputs:
         return None
     from synth.motion.coarse import upsample
     from synth.projection import project
@@ -91,7 +96,7 @@ def flow(scene: ElementsScene, stock: Stock, region: Any) -> Any:
 
     def velocity(frame: int) -> np.ndarray:
         """Heights per second; of a steady flow it is found once."""
-        values = stock.read("L", frame).values
+        values = inputs.read("L", frame).values
         if scene.elements.domain is None:
             return values
         if not before or not np.array_equal(before[0], values):
@@ -118,7 +123,7 @@ def _sampled(scene: ElementsScene, values: np.ndarray, points: np.ndarray) -> np
                      for d in range(scene.dimension)], axis=-1)
 
 
-def turn(scene: ElementsScene, stock: Stock) -> Any:
+def rotation(scene: ElementsScene, inputs: Inputs) -> Any:
     """The orientation field: local frames at points; None where nothing is turned."""
     from synth.elements.orientation import along_directions
 
@@ -127,7 +132,7 @@ def turn(scene: ElementsScene, stock: Stock) -> Any:
             return None
         case "flow":
             return lambda t, points: along_directions(
-                _sampled(scene, stock.read("L", min(t + 1, scene.frames)).values, points))
+                _sampled(scene, inputs.read("L", min(t + 1, scene.frames)).values, points))
     centre = np.array([0.0, 0.5, 0.0][: scene.dimension])
 
     def circling(t: int, points: np.ndarray) -> np.ndarray:
@@ -177,8 +182,8 @@ def allowed(scene: ElementsScene, example: Elements) -> Any:
     for number, selection in enumerate(scene.elements.selections):
         for kind in selection.kinds:
             if kind not in known:
-                raise WrongValue(f"elements.selections[{number}].kinds", f"the exemplar has no element of kind {kind}; "
-                                                                         f"it has {', '.join(map(str, known))}")
+                raise InvalidValue(f"elements.selections[{number}].kinds",
+                                   f"the exemplar has no element of kind {kind}; it has {', '.join(map(str, known))}")
     pictured = maps(scene)
     bits = [sum(1 << kind for kind in set(s.kinds)) for s in scene.elements.selections]
 

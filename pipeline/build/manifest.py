@@ -1,12 +1,11 @@
-"""Which files of an output folder are whole, and what each was made from: content decides, not time.
+"""Which files of an output folder are up to date, and what each was made from: content decides, not time.
 
 A folder ends with its `manifest.json`, written last: for each file its size, its SHA-256, and the key of what
-it was made from (scene tables, sources, input files). A file is whole if it is there, hashes to its entry and
-its entry has the key that is asked for. So touching a file changes nothing; a deleted, truncated or damaged
-one is noticed and made again, it alone.
+it was made from (`keys`). A file is up to date if it is there, hashes to its entry and its entry has the key that is
+asked for. So touching a file changes nothing; a deleted, truncated or damaged one is noticed and made again, it alone.
 
-While a stage works, each finished file has its entry as a note in `.whole/`; an interrupted run leaves the
-notes, and the next one goes on from them. Any number of processes may work in one folder: every write is a
+While a stage works, each finished file has its entry in the journal, the folder `.journal/`; an interrupted run leaves
+the journal, and the next one goes on from it. Any number of processes may work in one folder: every write is a
 rename, and two that make the same file write the same bits.
 """
 
@@ -25,7 +24,7 @@ from pipeline.errors import StorageFailed
 from pipeline.files import atomic
 
 MANIFEST = "manifest.json"
-NOTES = ".whole"
+JOURNAL = ".journal"
 
 
 @dataclass(frozen=True)
@@ -56,8 +55,8 @@ class Folder:
         self.entries = _entries(path)
         self._verified: dict[str, tuple[int, int]] = {}
 
-    def whole(self, name: str, key: str) -> Entry | None:
-        """The entry of `name` if that file is whole and was made from `key`."""
+    def up_to_date(self, name: str, key: str) -> Entry | None:
+        """The entry of `name` if that file is intact and was made from `key`."""
         entry = self.entries.get(name)
         return entry if entry and entry.key == key and self._intact(name, entry) else None
 
@@ -82,7 +81,7 @@ class Folder:
         for attempts_left in (2, 1, 0):
             try:
                 self._set_manifest_aside()
-                atomic.write_text(self.path / NOTES / f"{name}.note", _json({name: entry}))
+                atomic.write_text(self.path / JOURNAL / f"{name}.note", _json({name: entry}))
                 break
             except StorageFailed as error:
                 # another process has just closed the folder, and removed its notes under our hands
@@ -94,14 +93,14 @@ class Folder:
     def _set_manifest_aside(self) -> None:
         """From here on the folder is not what its manifest says; its entries still hold for the other files."""
         if (self.path / MANIFEST).exists():
-            (self.path / NOTES).mkdir(exist_ok=True)
+            (self.path / JOURNAL).mkdir(exist_ok=True)
             with contextlib.suppress(FileNotFoundError):  # another process was faster
-                os.replace(self.path / MANIFEST, self.path / NOTES / MANIFEST)
+                os.replace(self.path / MANIFEST, self.path / JOURNAL / MANIFEST)
 
     def close(self, keys: Mapping[str, str], about: Mapping[str, Any]) -> bool:
         """If every file of `keys` (name: key) is whole, write the manifest and tidy up; else return False."""
         self.entries |= _entries(self.path)  # other processes may have made some of them
-        found = {name: self.whole(name, key) for name, key in keys.items()}
+        found = {name: self.up_to_date(name, key) for name, key in keys.items()}
         whole = {name: entry for name, entry in found.items() if entry}
         if len(whole) < len(keys):
             return False
@@ -111,14 +110,14 @@ class Folder:
             atomic.write_text(manifest, written)
         self._remove(name for name in self.entries if name not in keys)
         self.entries = whole
-        _remove_notes(self.path)
+        _remove_journal(self.path)
         return True
 
     def discard(self) -> None:
         """Remove the files that the manifest and the notes name, them, and the folder if nothing else is in it."""
         self._remove(self.entries)
         (self.path / MANIFEST).unlink(missing_ok=True)
-        _remove_notes(self.path)
+        _remove_journal(self.path)
         with contextlib.suppress(OSError):  # the user keeps something of their own here
             self.path.rmdir()
 
@@ -127,8 +126,8 @@ class Folder:
             (self.path / name).unlink(missing_ok=True)
 
 
-def _remove_notes(path: Path) -> None:
-    notes = path / NOTES
+def _remove_journal(path: Path) -> None:
+    notes = path / JOURNAL
     for file in notes.glob("*") if notes.is_dir() else ():
         if file.suffix != atomic.SUFFIX:
             file.unlink(missing_ok=True)
@@ -145,7 +144,7 @@ def _json(entries: Mapping[str, Entry], about: Mapping[str, Any] | None = None) 
 def _entries(path: Path) -> dict[str, Entry]:
     """What the manifest of a folder and the notes of unfinished work say; a note is newer."""
     found = _read(path / MANIFEST)
-    notes = path / NOTES
+    notes = path / JOURNAL
     for file in [notes / MANIFEST, *sorted(notes.glob("*.note"))]:
         found |= _read(file)
     # once more: meanwhile another process may have turned the notes into a manifest

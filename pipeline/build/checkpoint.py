@@ -1,0 +1,46 @@
+"""The state that interrupted sequential work goes on from: the one mechanism for every artifact."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.files import atomic
+
+State = dict[str, np.ndarray]
+
+
+class Checkpoint:
+    """The last state of an artifact's work, beside its unfinished files; it goes when the folder is complete.
+
+    file  where it is kept
+    key   the key of one of the artifact's frames, as its manifest will say: a state of another scene, exemplar or
+          code is not gone on from
+    """
+
+    def __init__(self, file: Path, key: Callable[[int], str]):
+        self._file, self._key = file, key
+
+    def save(self, frame: int, state: Mapping[str, np.ndarray]) -> None:
+        """Keep the state after `frame`, the artifact's last or the one that is in work."""
+        with atomic.replacing(self._file) as temporary, temporary.open("wb") as content:
+            about = {"frame": np.array(frame), "key": np.array(self._key(frame))}
+            np.savez(content, allow_pickle=False, **about, **state)
+
+    def load(self, before: int | None = None) -> tuple[int, State] | None:
+        """The frame of the state that is kept, and the state, its arrays in the order they were saved in.
+
+        None if there is none, if it is of another key, damaged by a crash of the machine, or not of a frame `before`
+        this one.
+        """
+        try:
+            with self._file.open("rb") as file, np.load(file, allow_pickle=False) as kept:
+                frame = int(kept["frame"])
+                if str(kept["key"]) != self._key(frame) or (before is not None and not 0 < frame < before):
+                    return None
+                return frame, {name: kept[name] for name in kept.files if name not in ("frame", "key")}
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            return None

@@ -1,0 +1,349 @@
+"""The tables of a scene of motion fields (ma09), and what does not fit together in them.
+
+A key's section (§) is ma09's. The tables [exemplar], [coarse], [[obstacles]] and [render] stand with what they do:
+`exemplars`, `pipeline.flow`, `looks`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Field, Strict
+
+from pipeline.build.method import Faults
+from pipeline.build.view import value_at
+from pipeline.flow import Coarse, Obstacle, SceneInFlow
+from pipeline.motion.exemplars import Exemplar
+from pipeline.motion.looks import Render
+from pipeline.tables import FigureTable, Grid, Share, Table, Vector, Width, grid, key, listed, several
+
+LARGEST_RATIO = 4  # of the sizes of two exemplars: at the coarsest level a 9² neighbourhood sees both
+
+
+class Direction(Table):
+    """Where the local z axis faces at a point, placed by hand and interpolated over the domain (§3.3, [Turk 2001])."""
+
+    at: Vector = key("(x, y, z)", ..., "heights", min_length=3, max_length=3)
+    vector: Vector = key("(x, y, z), of any length", ..., min_length=3, max_length=3)
+
+
+def _neighborhoods(table: dict[str, Any]) -> tuple[int, ...]:
+    return (9,) if len(table.get("size", ())) == 3 else (17, 9)
+
+
+def _search(table: dict[str, Any]) -> str:
+    return "k-coherence" if len(table.get("size", ())) == 3 else "exact"
+
+
+class Detail(Table):
+    """The synthesis of H (§3.1 to 3.4, 3.7)."""
+
+    size: Grid = grid("columns and rows of H and F", (256, 256))
+    levels: Annotated[int, Field(ge=1, le=10)] | Literal["auto"] = key(
+        "of the image pyramid; \"auto\" brings the exemplar down to 8 cells", "auto")
+    neighborhoods: Annotated[tuple[Width, ...], Strict(False)] = key(
+        "widths, odd, in the order used (§4: 17² followed by 9²; 9² in 3-D)", _neighborhoods, "cells",
+        min_length=1, max_length=4)
+    iterations: int = key("of search and assignment with each width (§4: 3 to 5)", 4, ge=1, le=50)
+    search: Literal["exact", "k-coherence"] = key("exact, or k-coherence (§3.7)", _search)
+    k: int = key("candidates of k-coherence", 4, ge=1, le=32)
+    along: Literal["x", "y"] = key("the exemplar's axis that follows L (§3.3); \"y\": upright motifs rise upright", "x")
+    synthesize: Literal["motion", "potential"] = key(
+        "in the plane: H itself, or its potential, whose curl has no divergence (§3.6, Discussion); the exemplar's "
+        "mean motion, sources and sinks have no potential and are lost", "motion")
+    samples: Literal["grid", "lagrangian"] = key(
+        "in the plane: H is synthesized on the grid, or at samples that move with L and keep their detail (§5)", "grid")
+    facing: Literal["camera", "density", "directions"] = key(
+        "in 3-D, what the local z axis faces (§3.3): the front, out of the smoke that L carries, or what "
+        "[[detail.directions]] say", "camera")
+    directions: Annotated[tuple[Direction, ...], Strict(False)] = key(
+        "an array of tables [[detail.directions]], for facing = \"directions\"", (), max_length=256)
+    boundary: bool = key("observe the boundary of the obstacles: E_n (§3.6, Eq. 3)", True)
+
+
+Triple = tuple[float, float, float]
+PLANES: dict[str, tuple[Triple, Triple]] = {
+    "front": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+    "side": ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+    "top": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))}
+"""The planes of views: the exemplar's x and y axis in the local frame."""
+
+
+def _triple(vector: tuple[float, ...] | None) -> Triple:
+    x, y, z = vector or (0.0, 0.0, 0.0)
+    return x, y, z
+
+
+class View(Table):
+    """One of the views of 2-D exemplars that make a 3-D H (§3.2). It stands in the local frame, whose x axis (or y:
+    detail.along) follows L and whose z axis faces what detail.facing says; it fixes the components of H in its plane.
+    Without [[views]] the exemplar is seen from the front, the side and the top. Cells of all exemplars are cells of H:
+    their sizes may differ, up to four times. A VDB as exemplar (kind "field") is a view of all three components."""
+
+    plane: Literal["front", "side", "top"] | None = key(
+        "that the exemplar's x and y axis lie in: front x, y; side z, y; top x, z", None)
+    right: Vector | None = key("the exemplar's x axis in the local frame, instead of a plane", None, min_length=3,
+                               max_length=3)
+    up: Vector | None = key("its y axis, made perpendicular to right", None, min_length=3, max_length=3)
+    weight: float = key("of its matches beside those of the other views (§4)", 1.0, gt=0, le=1000)
+    exemplar: Annotated[Exemplar, Field(discriminator="kind")] | None = key(
+        "its own, a table with the keys of [exemplar]; none: that one", None)
+
+    @property
+    def axes(self) -> tuple[Triple, Triple]:
+        """Right and up, as they are written."""
+        return PLANES[self.plane] if self.plane else (_triple(self.right), _triple(self.up))
+
+
+    @property
+    def volumetric(self) -> bool:
+        """Whether its exemplar is a volume, which fixes all components."""
+        return self.exemplar is not None and self.exemplar.volumetric
+
+
+class Combine(Table):
+    """F = upsample(L) + ω H' (§3.5)."""
+
+    omega: float = key("ω, the length of the exemplar's longest vector in F", ..., "cells per frame", ge=0, le=1000)
+    weight: Literal["uniform", "kinetic-energy", "vorticity"] = key("what ω is proportional to in space", "uniform")
+    project: bool = key("make F divergence-free and let nothing flow through obstacles (§3.6, incompressibility); over "
+                        "the border it flows freely but where L is smoke in its box", False)
+
+
+class Source(Table):
+    """Where smoke enters, in every frame (supplement A: "inject density sources").
+    World units: the domain is 1 high, its floor at y = 0, centred on x = 0 and z = 0."""
+
+    kind: Literal["ball", "box"] = key("its form", "ball")
+    centre: Annotated[tuple[float, ...], Strict(False)] = key(
+        "(x, y) or (x, y, z)", (0.0, 0.1), "heights", min_length=2, max_length=3)
+    radius: Annotated[tuple[Annotated[float, Field(gt=0, le=10)], ...], Strict(False), BeforeValidator(several)] = key(
+        "of the ball, or half the box's edge; one number, or one for each axis", (0.08,), "heights",
+        min_length=1, max_length=3)
+    softness: float = key("share of the radius over which the edge fades", 0.3, ge=0, le=1)
+    level: float = key("density injected", 1.0, ge=0, le=1)
+    streaks: float = key("contrast of streaks, which draw the paths of the smoke", 0.0, ge=0, le=1)
+    streak_size: float = key("width of a streak", 0.02, "heights", gt=0, le=1)
+    streak_period: float = key("in which the streaks change", 40.0, "frames", gt=0, le=100000)
+    period: int = key("of puffs", 1, "frames", ge=1, le=100000)
+    duty: float = key("share of the period during which smoke enters", 1.0, ge=0, le=1)
+
+
+class Depth(Table):
+    """Gives the smoke of the plane a body: each part is about as deep as it is wide."""
+
+    reach: float = key("how deep the widest smoke reaches, to the front and to the back", 0.06, "heights", gt=0, le=0.5)
+
+
+class Density(Table):
+    """The smoke carried by F (supplement A)."""
+
+    scheme: Literal["windowed", "naive"] = key("pseudocode 4, or 3", "windowed")
+    m: int = key("frames of the window (supplement A: 10 to 20)", 16, "frames", ge=1, le=1000)
+    scale: int = key("density cells per field cell, along each axis", 2, ge=1, le=8)
+    border: Literal["zero", "clamp", "toroidal"] = key("what comes in over the border: nothing, the same, the other "
+                                                       "side", "zero")
+    sources: Annotated[tuple[Source, ...], Strict(False)] = key(
+        "where smoke enters, an array of tables [[density.sources]]", (Source(),), min_length=1, max_length=64)
+    depth: Depth | None = key("makes the density a volume, for [render] kind = \"volume\"", None)
+
+
+class Blades(Table):
+    """A bed of seaweed that F bends (§4, figure 9: "use that to direct the movements of points on the seaweed
+    polygonal models"); for fields in space."""
+
+    height: float = key("of the tallest blade", 0.95, "heights", gt=0, le=2)
+    spacing: float = key("least distance of two plants", 0.13, "heights", ge=0.03, le=2)
+    cover: Share = key("of the floor that plants stand on, in patches", 0.5)
+    bend: float = key("tangent of the angle by which a flow of one height per second bends a tip", 2.0, ge=0, le=100)
+    window: int = key("whose motion a tip follows; half of it is its lag", 9, "frames", ge=1, le=100)
+
+
+class Particles(Table):
+    """Particles that F carries, for [render] kind = "particles" (figure 7)."""
+
+    count: int = key("how many", 40000, ge=1, le=10000000)
+    life: int = key("after which one is born again elsewhere", 60, "frames", ge=2, le=100000)
+
+
+Panel = Literal["input", "exemplar", "exemplar-colour", "exemplar-arrows", "coarse", "coarse-colour", "detail",
+                "detail-colour", "detail-arrows", "detail-divergence", "combined", "combined-colour", "result"]
+
+
+def is_of_exemplar(panel: str) -> bool:
+    """Whether there are as many of a panel as there are exemplars."""
+    return panel.partition("-")[0] in ("input", "exemplar")
+
+
+class Figure(FigureTable):
+    """The panels of X.png and X.mp4. With several variants and one panel, one panel for each of them; with
+    several of both, one row for each variant. A panel of the exemplar stands once for each exemplar of the views."""
+
+    panels: Annotated[tuple[Panel, ...], Strict(False)] = key("from left to right", ("result",), min_length=1)
+    plane: Literal["front", "side", "top"] = key("of the middle slice that panels of 3-D fields show", "front")
+
+
+class MotionScene(SceneInFlow):
+    """The scene itself: keys above the first table."""
+
+    exemplar: Exemplar = Field(discriminator="kind")
+    coarse: Coarse = Field(discriminator="kind")
+    views: Annotated[tuple[View, ...], Strict(False)] = key(
+        "in 3-D, an array of tables [[views]]; none: front, side and top of [exemplar]", (), max_length=16)
+    detail: Detail = Detail()
+    obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = key(
+        "solids in the flow, an array of tables [[obstacles]]", (), max_length=64)
+    combine: Combine
+    density: Density = Density()
+    particles: Particles = Particles()
+    blades: Blades = Blades()
+    render: Render = Field(discriminator="kind")
+    figure: Figure = Figure()
+
+    cells_key: ClassVar[str] = "detail.size"
+
+    @property
+    def cells(self) -> tuple[int, ...]:
+        """Of H and F, x first."""
+        return self.detail.size
+
+    @property
+    def seen(self) -> tuple[Any, ...]:
+        """The views of a 3-D scene (View), each with its exemplar."""
+        planes: tuple[Any, ...] = ("front",) if self.exemplar.volumetric else ("front", "side", "top")
+        views = self.views or tuple(View(plane=plane) for plane in planes)
+        return tuple(view if view.exemplar else view.model_copy(update={"exemplar": self.exemplar}) for view in views)
+
+    @property
+    def exemplars(self) -> dict[str, str]:
+        """The names of the exemplars, and the key of each: exemplar, or where the views of a 3-D scene have several
+        exemplar-front, exemplar-top … (after the first view that shows it; exemplar-1 … without a plane)."""
+        if self.dimension == 2:
+            return {"exemplar": "exemplar"}
+        first: dict[Any, int] = {}
+        for number, view in enumerate(self.seen):
+            first.setdefault(view.exemplar, number)
+        planes = [self.seen[number].plane for number in first.values()]
+        names = [plane if plane and planes.count(plane) == 1 else str(place) for place, plane in enumerate(planes, 1)]
+        return {f"exemplar-{name}" if len(first) > 1 else "exemplar":
+                f"views[{number}].exemplar" if self.views and self.views[number].exemplar else "exemplar"
+                for name, number in zip(names, first.values(), strict=True)}
+
+    @property
+    def seen_exemplars(self) -> tuple[str, ...]:
+        """The name of the exemplar of each view of `seen`."""
+        names = {value_at(self, at): name for name, at in self.exemplars.items()}
+        return tuple(names[view.exemplar] for view in self.seen)
+
+
+# -- what does not fit together -----------------------------------------------------------------------------------
+
+
+def fits_its_dimension(scene: MotionScene) -> Faults:
+    """What is for a field in the plane and what is for one in space."""
+    detail, density = scene.detail, scene.density
+    size = listed(detail.size)
+    if scene.dimension == 2:
+        need = f"needs a field in space; detail.size is {size}"
+        if scene.views:
+            yield "views", need
+        if detail.facing != "camera":
+            yield "detail.facing", need
+        if scene.figure.plane != "front":
+            yield "figure.plane", need
+        for number, source in enumerate(density.sources):
+            if len(source.centre) != 2:
+                yield f"density.sources[{number}].centre", need
+    else:
+        if density.depth is not None:
+            yield "density.depth", f"gives a plane a body; detail.size is {size}, which has one"
+        for name, default in (("synthesize", "motion"), ("samples", "grid")):
+            chosen = getattr(detail, name)
+            if chosen != default:
+                yield f"detail.{name}", f'"{chosen}" is for a field in the plane; detail.size is {size}'
+    if detail.samples == "lagrangian":
+        if detail.search != "exact":
+            yield "detail.search", "samples that move have no fixed neighbours for k-coherence to ask: say exact"
+        if detail.synthesize != "motion":
+            yield "detail.synthesize", "the potential is synthesized on the grid only"
+    if (detail.facing == "directions") != bool(detail.directions):
+        yield "detail.directions", ("is missing, for facing = \"directions\"" if not detail.directions else
+                                    f"is not used with facing = \"{detail.facing}\"")
+    for number, direction in enumerate(detail.directions):
+        if not any(direction.vector):
+            yield f"detail.directions[{number}].vector", "is zero: it faces nowhere"
+        if direction.at in [other.at for other in detail.directions[:number]]:
+            yield f"detail.directions[{number}].at", "is the place of one before it"
+
+
+def exemplar_fits(scene: MotionScene) -> Faults:
+    """The exemplar of a field in the plane."""
+    if scene.dimension == 3:
+        return
+    size, levels = scene.exemplar.size, scene.detail.levels
+    if size > min(scene.detail.size):
+        yield "exemplar.size", f"an exemplar of {size}² is larger than the output ({listed(scene.detail.size)})"
+    if isinstance(levels, int) and size >> (levels - 1) < 4:
+        yield "detail.levels", f"{levels} levels bring an exemplar of {size}² below 4 cells"
+
+
+def views_fit(scene: MotionScene) -> Faults:
+    """The views of a field in space (§3.2): whole, of one scale, smaller than the output, and enough of them."""
+    if scene.dimension == 2:
+        return
+    smallest = min(view.exemplar.size for view in scene.seen)
+    for number, view in enumerate(scene.seen):
+        exemplar, where = view.exemplar, f"views[{number}]"
+        if not view.plane and not (view.right and view.up):
+            yield where, "needs a plane, or both right and up"
+            return
+        if view.plane and (view.right or view.up):
+            yield f"{where}.plane", "says what right and up say too: leave one out"
+        if _parallel(*view.axes):
+            yield f"{where}.up", "is parallel to right, or one of them is zero: they span no plane"
+        spanned = [n for n, *along in zip(scene.detail.size, *view.axes, strict=True) if any(along) or view.volumetric]
+        size, power = exemplar.size, "³" if view.volumetric else "²"
+        key = f"{where}.exemplar.size" if scene.views and scene.views[number].exemplar else "exemplar.size"
+        if size > min(spanned):
+            output = listed(scene.detail.size)
+            yield key, f"an exemplar of {size}{power} is larger than the output ({output}) along an axis of its view"
+        if size > LARGEST_RATIO * smallest:
+            yield key, f"an exemplar of {size}{power} beside one of {smallest}²: at most {LARGEST_RATIO} times as large"
+    blind = not any(view.volumetric for view in scene.seen) and _unseen([a for view in scene.seen for a in view.axes])
+    if blind:
+        yield "views", f"do not span space: none of them shows {blind}"
+    levels = scene.detail.levels
+    if isinstance(levels, int) and smallest >> (levels - 1) < 4:
+        yield "detail.levels", f"{levels} levels bring an exemplar of {smallest}² below 4 cells"
+
+
+def _parallel(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Whether two vectors of space span no plane to speak of."""
+    cross = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    return math.hypot(*cross) <= 1e-3 * math.hypot(*a) * math.hypot(*b)
+
+
+def _unseen(vectors: Sequence[Sequence[float]]) -> str:
+    """The direction that all vectors, of which two span a plane, are perpendicular to; "" if they span space."""
+    a = vectors[0]
+    b = next(v for v in vectors if not _parallel(a, v))
+    normal = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    unit = [n / math.hypot(*normal) for n in normal]
+    for v in vectors:
+        if abs(sum(n * c for n, c in zip(unit, v, strict=True))) > 1e-3 * math.hypot(*v):
+            return ""
+    axis = next((name for name, n in zip("xyz", unit, strict=True) if abs(n) > 0.995), "")
+    return (axis or "(" + ", ".join(f"{n:.2g}" for n in unit) + ")") + " of the local frame"
+
+
+def render_fits(scene: MotionScene) -> Faults:
+    """Check: the look, and what the figure shows of it."""
+    yield from scene.render.faults(scene)
+
+
+def samples_fit(scene: MotionScene) -> Faults:
+    """Check: samples that move, and the obstacles."""
+    if scene.obstacles and scene.detail.boundary and scene.detail.samples == "lagrangian":
+        yield "detail.samples", "samples that move do not observe a boundary: say boundary = false"
