@@ -39,8 +39,8 @@ def drawn(picture: np.ndarray, tails: np.ndarray, vectors: np.ndarray, length: f
 
 
 def grid(shape: Sequence[int], picture: Sequence[int], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A regular grid of points, `count` of them across: rows and columns of the cells (Y, X) they lie in, and their
-    positions (N, 2) x, y in a picture (h, w), pixels from the lower left corner."""
+    """A regular grid of points, `count` of them across: rows and columns of the cells (Y, X) they lie in, and
+    their positions (N, 2) x, y in a picture (h, w), pixels from the lower left corner."""
     down = max(1, round(count * shape[0] / shape[1]))
     y, x = np.meshgrid((np.arange(down) + 0.5) / down, (np.arange(count) + 0.5) / count, indexing="ij")
     rows, columns = (y * shape[0]).astype(int).ravel(), (x * shape[1]).astype(int).ravel()

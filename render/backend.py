@@ -1,9 +1,9 @@
 """The only module that imports Mitsuba and Dr.Jit: which LLVM they use, which folder their plug-ins come from.
 
-It works around two problems. Mitsuba looks for plug-ins in the working directory first, and loads any library it finds
-there; `mitsuba` removes that folder from the search path before anything is instantiated. Dr.Jit accepts LLVM 15 and
-16 and then aborts the process on a real render; `llvm_library` accepts a candidate only after a child process has
-rendered with it.
+It works around two problems. Mitsuba looks for plug-ins in the working directory first, and loads any library
+it finds there; `mitsuba` removes that folder from the search path before anything is instantiated. Dr.Jit
+accepts LLVM 15 and 16 and then aborts the process on a real render; `llvm_library` accepts a candidate only
+after a child process has rendered with it.
 
 Run as a script (`python backend.py VARIANT [LIBRARY]`), this file is that child process.
 """

@@ -1,9 +1,9 @@
 """Denoising of path-traced smoke: each window of the picture is fitted to guides that have no noise.
 
-The guides are a ray-marched picture of the same grid (`render.march`) and the studio without smoke. Within a small
-window path-traced light is close to a linear function of them, so a weighted least-squares fit keeps every edge that
-the guides show and averages the rest (first-order regression: Moon et al. 2014, Bitterli et al. 2016). It is an
-approximation: what no guide shows is blurred to the size of the window.
+The guides are a ray-marched picture of the same grid (`render.march`) and the studio without smoke. Within a
+small window path-traced light is close to a linear function of them, so a weighted least-squares fit keeps
+every edge that the guides show and averages the rest (first-order regression: Moon et al. 2014, Bitterli et
+al. 2016). It is an approximation: what no guide shows is blurred to the size of the window.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ RIDGE = 1e-3  # of a guide's variance in the whole picture
 def guides(seen: march.Seen, empty: march.EmptyStudio) -> np.ndarray:
     """The ray-marched guides of a picture, (h, w, 9) float32, without noise.
 
-    The share of light that passes the smoke; the smoke's own light; the studio seen through it; for each lamp, the
-    brightness of the studio in the smoke's shadow.
+    The share of light that passes the smoke; the smoke's own light; the studio seen through it; for each
+    lamp, the brightness of the studio in the smoke's shadow.
     """
     behind = seen.passed[..., None] * empty.light
     shaded = seen.shares * behind.mean(axis=-1)

@@ -1,7 +1,7 @@
 """Figures as papers print them: panels in rows on white, thin borders, a label below each, insets, a legend.
 
-Text is set in Droid Serif (Apache 2.0), which the OpenImageIO package contains; Greek letters, which it lacks, in Droid
-Sans Mono. Labels may hold `*asterisks*` for italics, as a paper sets its symbols.
+Text is set in Droid Serif (Apache 2.0), which the OpenImageIO package contains; Greek letters, which it
+lacks, in Droid Sans Mono. Labels may hold `*asterisks*` for italics, as a paper sets its symbols.
 """
 
 from __future__ import annotations

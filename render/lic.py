@@ -1,7 +1,7 @@
 """Pictures of vector fields: line integral convolution (Cabral and Leedom 1993), direction and divergence as colour.
 
-As in ma09 figure 4, LIC shows zero vectors as white noise that is not integrated, with reduced amplitude. Fields have
-y up (row 0 is the bottom); the pictures have their top row first.
+As in ma09 figure 4, LIC shows zero vectors as white noise that is not integrated, with reduced amplitude.
+Fields have y up (row 0 is the bottom); the pictures have their top row first.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ SPLINE_BORDER = 12  # cells over which a spline coefficient's influence falls be
 
 
 def slice_of(v: np.ndarray, plane: str = "front") -> np.ndarray:
-    """The middle slice of a 3-D field (Z, Y, X, 3) with the two components in its plane: (x, y) as (Y, X, 2) from the
-    front, (z, y) as (Y, Z, 2) from the side, (x, z) as (Z, X, 2) from the top."""
+    """The middle slice of a 3-D field (Z, Y, X, 3) with the two components in its plane: (x, y) as (Y, X, 2)
+    from the front, (z, y) as (Y, Z, 2) from the side, (x, z) as (Z, X, 2) from the top."""
     if v.ndim != 4 or v.shape[3] != 3:
         raise ValueError(f"expected a field (Z, Y, X, 3), got {v.shape}")
     z, y, x = (n // 2 for n in v.shape[:3])

@@ -9,10 +9,10 @@
     shade      the share of a lamp's light that passes the smoke and falls on the surfaces around it
     seen       all of it, in a studio
 
-Three approximations: after its first scattering, light is treated as scattering isotropically in thinner smoke
-(similarity relation: extinction times 1 - albedo * forward); multiple scattering follows 24 directions; and the smoke
-does not light the surfaces. All else is what a path tracer converges to. The NumPy functions named *_reference are
-the specification of the kernels.
+Three approximations: after its first scattering, light is treated as scattering isotropically in thinner
+smoke (similarity relation: extinction times 1 - albedo * forward); multiple scattering follows 24 directions;
+and the smoke does not light the surfaces. All else is what a path tracer converges to. The NumPy functions
+named *_reference are the specification of the kernels.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Grid:
 
 @dataclass(frozen=True)
 class Medium:
-    """albedo: scattered share of the extinction, in three colours; forward: mean cosine of the scattering angle
-    (Henyey and Greenstein)."""
+    """albedo: scattered share of the extinction, in three colours; forward: mean cosine of the scattering
+    angle (Henyey and Greenstein)."""
 
     albedo: tuple[float, float, float]
     forward: float
@@ -196,8 +196,8 @@ def arriving(sigma: Any, shape: tuple[int, ...], points: np.ndarray, facing: np.
 
 
 def halved_reference(sigma: np.ndarray, light: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray]:
-    """Extinction per cell, times `share`, and light (Z, Y, X, C) on cells twice as large; the light is the mean
-    weighted by extinction."""
+    """Extinction per cell, times `share`, and light (Z, Y, X, C) on cells twice as large; the light is the
+    mean weighted by extinction."""
     odd = [(0, n % 2) for n in sigma.shape]
     blocks = [n for size in sigma.shape for n in (-(-size // 2), 2)]
 

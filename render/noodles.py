@@ -3,9 +3,9 @@
 `picture` path-traces tubes with Mitsuba (llvm) and returns linear Rec.709 light (h, w, 3) float32, top row first;
 `inset` does the same with an exemplar, on the table without a plate. `render.tonemap` tone-maps both ("filmic").
 
-There is no subsurface scattering. Instead a part of the light is transmitted diffusely by the wall of a tube, into it
-and out on the other side, and takes the colour of dough each time: thin parts and edges against the light glow, and
-the inside of a heap is warm instead of black.
+There is no subsurface scattering. Instead a part of the light is transmitted diffusely by the wall of a tube,
+into it and out on the other side, and takes the colour of dough each time: thin parts and edges against the
+light glow, and the inside of a heap is warm instead of black.
 
 World units: the plate's well is at y = 0, a plate of noodles about one unit wide, centred on x = z = 0.
 """
@@ -63,8 +63,8 @@ def view(low: np.ndarray, high: np.ndarray, aspect: float) -> tuple[studio.Camer
 
 def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,
           shot: studio.Shot) -> np.ndarray:
-    """An exemplar's noodles on the table without a plate, lit as in `picture`; the box from `low` to `high` (3,),
-    which contains them in all frames, fills the picture."""
+    """An exemplar's noodles on the table without a plate, lit as in `picture`; the box from `low` to `high`
+    (3,), which contains them in all frames, fills the picture."""
     camera = shot.camera or CAMERA
     level = float(studio.placed(np.stack([low, high]), low, high, camera, shot.aspect)[0, 1])
     placed = studio.placed(vertices, low, high, camera, shot.aspect)

@@ -38,8 +38,8 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: 
 
 def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,
           shot: studio.Shot) -> np.ndarray:
-    """An exemplar's sheets in the air, lit as in `picture`; the box from `low` to `high` (3,), which contains them in
-    all frames, fills the picture."""
+    """An exemplar's sheets in the air, lit as in `picture`; the box from `low` to `high` (3,), which contains
+    them in all frames, fills the picture."""
     camera = shot.camera or CAMERA
     box = studio.placed(np.stack([low, high]), low, high, camera, shot.aspect)
     placed = studio.placed(vertices, low, high, camera, shot.aspect)

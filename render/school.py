@@ -33,7 +33,7 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: 
 
 def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,
           shot: studio.Shot) -> np.ndarray:
-    """An exemplar's fish, lit as in `picture`; the box from `low` to `high` (3,), which contains them in all frames,
-    fills the picture."""
+    """An exemplar's fish, lit as in `picture`; the box from `low` to `high` (3,), which contains them in all
+    frames, fills the picture."""
     placed = studio.placed(vertices, low, high, shot.camera or CAMERA, shot.aspect)
     return picture(placed, faces, colours, shot)

@@ -80,8 +80,8 @@ def _blurred(values: np.ndarray, sigma: float) -> np.ndarray:
 def _relief(rho: np.ndarray) -> np.ndarray:
     """Half thickness (Y, X) of the slab, 1 = full: a rounded body plus the detail of the density.
 
-    The body makes the plume look round; the detail turns small differences of density, which opaque smoke would
-    hide, into slopes that catch the light.
+    The body makes the plume look round; the detail turns small differences of density, which opaque smoke
+    would hide, into slopes that catch the light.
     """
     def blurred(radius: float) -> np.ndarray:
         return _blurred(rho, radius * rho.shape[0])
@@ -111,9 +111,9 @@ def _backdrop(height: int, width: int) -> np.ndarray:
 def lit(density: np.ndarray, width: int) -> np.ndarray:
     """A slab of smoke (Y, X) with self-shadowing before a dark backdrop: linear light (h, width, 3).
 
-    The slab has a thickness and is drawn in layers. A warm key light comes from the front left, a cool rim light from
-    behind on the right, a dim sky from the front; the smoke in the slab's plane dims each of them as well. The smoke
-    casts a shadow on the backdrop.
+    The slab has a thickness and is drawn in layers. A warm key light comes from the front left, a cool rim
+    light from behind on the right, a dim sky from the front; the smoke in the slab's plane dims each of them
+    as well. The smoke casts a shadow on the backdrop.
     """
     density = checked_density(density, 2)
     height = lic.height_for(density.shape, width)
@@ -252,8 +252,8 @@ def _empty_studio(settings: VolumeSettings) -> march.EmptyStudio:
 
 
 def _border(mi: Any) -> np.ndarray:
-    """The light (6, 4, 3) that reaches the middle of the studio from each of `march.directions`, without what comes
-    straight from the lamps."""
+    """The light (6, 4, 3) that reaches the middle of the studio from each of `march.directions`, without what
+    comes straight from the lamps."""
     light = np.zeros((6, 4, 3), np.float64)
     random = np.random.Generator(np.random.Philox(key=1))
     middle = mi.Point3f(0.0, 0.5, 0.0)

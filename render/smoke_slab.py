@@ -1,8 +1,8 @@
 """Light through a slab of smoke: layers, slanted lights, a sky; kernels in smoke_slab.cl.
 
-The NumPy functions are the specification; `light` runs the kernels and must equal `light_reference`. A slab is given
-by two arrays (Y, X) float32: `depth`, its optical depth where its thickness is 2, and `relief`, half its thickness.
-y is up, layers are counted from the front.
+The NumPy functions are the specification; `light` runs the kernels and must equal `light_reference`. A slab
+is given by two arrays (Y, X) float32: `depth`, its optical depth where its thickness is 2, and `relief`, half
+its thickness. y is up, layers are counted from the front.
 """
 
 from __future__ import annotations

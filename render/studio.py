@@ -1,7 +1,7 @@
 """Camera, shot and lights, and the studio of volumes: a seamless backdrop and the bowl that smoke rises from.
 
-Everything is plain numbers and vertex/face arrays in world units (y up, floor at y = 0, the subject about one unit
-high, centred on x = z = 0). `render.mitsuba_shapes` turns them into Mitsuba's scene.
+Everything is plain numbers and vertex/face arrays in world units (y up, floor at y = 0, the subject about one
+unit high, centred on x = z = 0). `render.mitsuba_shapes` turns them into Mitsuba's scene.
 """
 
 from __future__ import annotations
@@ -123,8 +123,8 @@ def raised(elevation: float) -> Camera:
 
 
 def framing(low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) -> Camera:
-    """The camera translated, with the same direction and lens, until a box from `low` to `high` (3,) fills the middle
-    of a picture of `aspect`, width over height."""
+    """The camera translated, with the same direction and lens, until a box from `low` to `high` (3,) fills
+    the middle of a picture of `aspect`, width over height."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     right, up, ahead = camera.axes
     corners = 0.5 * (high - low) * (np.indices((2, 2, 2)).reshape(3, -1).T * 2 - 1)

@@ -44,8 +44,8 @@ def to_display(light: np.ndarray, curve: Curve) -> np.ndarray:
 def eight_bit(display: np.ndarray, seed: int = 0) -> np.ndarray:
     """Display values (h, w, 3) in [0, 1] as uint8, dithered with triangular noise of plus or minus one step.
 
-    Without the noise a soft gradient would show banding. The noise depends on `seed` and shape only, so it does not
-    flicker in an animation. Exact black and exact white stay exact.
+    Without the noise a soft gradient would show banding. The noise depends on `seed` and shape only, so it
+    does not flicker in an animation. Exact black and exact white stay exact.
     """
     display = np.clip(display, 0.0, 1.0)
     noise = np.where((display == 0.0) | (display == 1.0), np.float32(0.0), _triangular(display.shape, seed))

@@ -60,8 +60,8 @@ SAND_CELLS = (560, 620)
 
 
 def caustics(time: float, seed: int) -> np.ndarray:
-    """Sunlight on the floor, (CAUSTICS, CAUSTICS) float32, 1 on average; rows along z, columns along x of the lit
-    square; time in seconds.
+    """Sunlight on the floor, (CAUSTICS, CAUSTICS) float32, 1 on average; rows along z, columns along x of the
+    lit square; time in seconds.
 
     Rays are refracted by WAVES waves, which move as deep-water waves; the light is the density of rays on the floor.
     """
@@ -154,8 +154,8 @@ def sand() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def through_water(mi: Any, sunlight: np.ndarray, look: Water) -> Any:
     """The integrator: sun and sky on the first surface of a path, sun and ambient light on the second, in water.
 
-    Every term is sampled for each ray, with less noise than a path tracer that picks sun or sky at random. The light of
-    the water itself is a formula per ray; there is no scattering in it.
+    Every term is sampled for each ray, with less noise than a path tracer that picks sun or sky at random.
+    The light of the water itself is a formula per ray; there is no scattering in it.
     """
     dr = backend.drjit()
     shafts = ndimage.gaussian_filter(sunlight, SHAFT_BLUR, mode="wrap")[::4, ::4]

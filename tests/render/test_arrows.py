@@ -1,4 +1,4 @@
-"""Arrows: where they stand, which way they point, how much ink they take."""
+"""Arrows: their position, direction and coverage."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def one(vector: tuple[float, float]) -> np.ndarray:
     return arrows.drawn(GREY, np.array([[30.0, 20.0]]), np.array([vector]), 20.0, arrows.RED)
 
 
-def test_an_arrow_starts_at_its_tail_and_goes_its_way() -> None:
+def test_an_arrow_starts_at_its_tail_and_follows_its_vector() -> None:
     for vector, spread in (((1, 0), "x"), ((0, 1), "y"), ((-1, 0), "-x"), ((0, -1), "-y")):
         x, y = ink(one(vector))
         reach = {"x": x - 30, "-x": 30 - x, "y": y - 20, "-y": 20 - y}[spread]
@@ -30,7 +30,7 @@ def test_an_arrow_starts_at_its_tail_and_goes_its_way() -> None:
         assert np.ptp(across[reach > 13]) > np.ptp(across[reach < 8]) + 1
 
 
-def test_length_counts_not_direction() -> None:
+def test_coverage_depends_on_length_not_direction() -> None:
     wide = np.full((200, 200, 3), 0.5, np.float32)
     straight, aslant = (arrows.drawn(wide, np.array([[50.0, 50.0]]), np.array([v]), 100.0, arrows.RED)
                         for v in ((5.0, 0.0), (3.0, 4.0)))
@@ -43,8 +43,8 @@ def test_the_picture_given_stays_as_it_is_and_no_motion_draws_nothing() -> None:
     one((1, 0))
     np.testing.assert_array_equal(GREY, before)
     np.testing.assert_array_equal(one((0, 0)), GREY)
-    two = arrows.drawn(GREY, np.array([[30.0, 20.0], [10.0, 10.0]]), np.array([[1.0, 0.0], [0.05, 0.0]]), 20.0,
-                       arrows.RED)
+    tails, vectors = np.array([[30.0, 20.0], [10.0, 10.0]]), np.array([[1.0, 0.0], [0.05, 0.0]])
+    two = arrows.drawn(GREY, tails, vectors, 20.0, arrows.RED)
     np.testing.assert_array_equal(two, one((1, 0)))
 
 

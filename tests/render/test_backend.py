@@ -61,7 +61,7 @@ def leaves_a_mark(folder: Path, load: str, variant: str) -> bool:
 
 @pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
 def test_a_library_in_the_working_directory_is_never_loaded(hostile: Path, variant: str) -> None:
-    assert leaves_a_mark(hostile, BARE, variant), "Mitsuba alone no longer does it: this test tests nothing"
+    assert leaves_a_mark(hostile, BARE, variant), "Mitsuba alone no longer does it: this test shows nothing"
     assert not leaves_a_mark(hostile, OURS, variant)
 
 
@@ -77,9 +77,10 @@ def test_both_variants_render_in_one_process() -> None:
 
 
 def test_what_a_picture_depends_on_is_named() -> None:
-    told = backend.versions("llvm_ad_rgb")
-    assert told["variant"] == "llvm_ad_rgb" and told["mitsuba"] == "3.9.1" and told["drjit"] == "1.5.0"
-    assert int(told["llvm"].split(".")[0]) == backend.version_in_name(backend.llvm_library()) >= 17
+    versions = backend.versions("llvm_ad_rgb")
+    assert versions["variant"] == "llvm_ad_rgb"
+    assert versions["mitsuba"] == "3.9.1" and versions["drjit"] == "1.5.0"
+    assert int(versions["llvm"].split(".")[0]) == backend.version_in_name(backend.llvm_library()) >= 17
     assert "llvm" not in backend.versions("scalar_rgb")
 
 

@@ -1,4 +1,4 @@
-"""Beads on paper: they lie where they should, the picture repeats, obstacles stand up and what is beyond does not."""
+"""Beads on paper: bits repeat, beads are in the right place, obstacles are raised and paper beyond is not."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def red_bead(x: float, y: float) -> mesh.Mesh:
     return mesh.solids(np.array([[x, y]]), np.array([0.1]), np.array([[0.9, 0.1, 0.1]]))
 
 
-def test_a_picture_repeats_and_a_bead_lies_where_it_should() -> None:
+def test_a_picture_repeats_and_a_bead_is_in_its_place() -> None:
     m = red_bead(0.5, 0.375)
     first = beads.picture(m.vertices, m.faces, m.colours, ground(), SMALL)
     assert first.shape == (48, 64, 3) and np.isfinite(first).all()
@@ -41,18 +41,19 @@ def test_a_bead_throws_a_shadow_away_from_the_lamp() -> None:
 
 
 def test_holes_are_obstacles_and_what_encloses_is_beyond() -> None:
-    away, hole = beads._distances(ground(DISC_WITH_HOLE), X, Y)
-    assert away == pytest.approx(DISC_WITH_HOLE, abs=1e-5)
+    distance, hole = beads._distances(ground(DISC_WITH_HOLE), X, Y)
+    assert distance == pytest.approx(DISC_WITH_HOLE, abs=1e-5)
     radius = np.hypot(X, Y)
     assert hole[radius < 0.28].all() and not hole[radius > 0.92].any()
-    z, colour = beads.relief(away, hole)
+    z, colour = beads.relief(distance, hole)
     assert (z[radius < 0.28] > 0.9 * beads.RISE).all() and (z[radius > 0.92] < 0).all()
     assert (z[(radius > 0.32) & (radius < 0.88)] == 0).all()
     assert (colour[radius < 0.28] == beads.OBSTACLE).all() and (colour[radius > 0.92] == beads.BEYOND).all()
 
 
 def test_a_picture_shows_the_obstacle_dark_on_white() -> None:
-    seen = beads.picture(np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros((0, 3)), ground(DISC_WITH_HOLE), SMALL)
+    nothing = np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros((0, 3))
+    seen = beads.picture(*nothing, ground(DISC_WITH_HOLE), SMALL)
     assert seen[22:26, 30:34].mean() < 0.3 * seen[22:26, 48:52].mean()
     assert seen[0, 0].mean() < 0.8 * seen[22:26, 48:52].mean()
 
@@ -67,4 +68,5 @@ def test_level_paper_is_tiled_coarsely_and_nothing_is_left_out() -> None:
     assert (area > 0).all() and area.sum() == (rows - 1) * (columns - 1)
     assert len(faces) < 0.6 * 2 * (rows - 1) * (columns - 1)
     high = z.ravel()[faces]
-    assert (area[high.max(axis=1) > 0] == 0.5).all() and (area[high.min(axis=1) != high.max(axis=1)] == 0.5).all()
+    assert (area[high.max(axis=1) > 0] == 0.5).all()
+    assert (area[high.min(axis=1) != high.max(axis=1)] == 0.5).all()

@@ -1,5 +1,7 @@
 """render.denoise: fits whose result is known, and the noise that a real render loses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ def noise(*shape: int, seed: int = 1) -> np.ndarray:
     return np.random.Generator(np.random.Philox(key=seed)).standard_normal(shape)
 
 
-def test_guides_know_what_is_seen_and_what_lies_in_shadow() -> None:
+def test_guides_hold_the_visible_studio_and_its_shadows() -> None:
     """No smoke: the guides are the empty studio; half seen and half in shadow: a half and a quarter of it."""
     layers = np.abs(noise(3, 2, 4, 3))
     empty = march.EmptyStudio(np.zeros(3), np.ones((2, 4, 3)), np.ones((2, 4)), layers, np.zeros((6, 4, 3)))
@@ -18,13 +20,14 @@ def test_guides_know_what_is_seen_and_what_lies_in_shadow() -> None:
     assert clear.shape == (2, 4, 9) and clear.dtype == np.float32
     assert clear[..., 4:7] == pytest.approx(layers.sum(axis=0), rel=1e-6)
     assert clear[..., 7] == pytest.approx(layers.sum(axis=0).mean(axis=-1), rel=1e-6)
-    half = denoise.guides(march.Seen(np.ones((2, 4, 3)), np.full((2, 4), 0.5), np.full((2, 2, 4), 0.5)), empty)
+    halved = march.Seen(np.ones((2, 4, 3)), np.full((2, 4), 0.5), np.full((2, 2, 4), 0.5))
+    half = denoise.guides(halved, empty)
     assert half[..., 0] == pytest.approx(0.5) and half[..., 1:4] == pytest.approx(1.0)
     assert half[..., 4:7] == pytest.approx(0.5 * clear[..., 4:7])
     assert half[..., 7:] == pytest.approx(0.25 * clear[..., 7:])
 
 
-def test_what_is_linear_in_the_guides_stays_as_it_is() -> None:
+def test_a_linear_function_of_the_guides_is_kept() -> None:
     guides = noise(20, 24, 3)
     exact = 5.0 + guides @ np.array([[1.0, 0.2, 0.0], [0.0, 0.3, 1.0], [0.5, 0.0, 0.1]])
     assert denoise.regressed(exact, guides, 3.0) == pytest.approx(exact, abs=1e-4)
@@ -59,13 +62,14 @@ def test_a_render_of_two_paths_comes_near_one_of_many() -> None:
     cloud = np.clip(1.2 - np.hypot(np.hypot(x, y), z) + 0.3 * np.sin(7 * x) * np.cos(6 * y), 0.0, 1.0)
     placed = (cloud.astype(np.float32), 0.035, (-0.26, 0.1, -0.2))
     few = smoke.VolumeSettings(width=56, height=70, spp=2, extinction=30.0, bowl=(0.2, 0.1), denoised=False)
-    truth = smoke.volume(*placed, smoke.VolumeSettings(**{**vars(few), "spp": 96, "seed": 1000}))
+    truth = smoke.volume(*placed, replace(few, spp=96, seed=1000))
     raw = smoke.volume(*placed, few)
-    clean = smoke.volume(*placed, smoke.VolumeSettings(**{**vars(few), "denoised": True}))
+    denoised = replace(few, denoised=True)
+    clean = smoke.volume(*placed, denoised)
 
     def error(picture: np.ndarray) -> float:
         return float(np.sqrt(((picture - truth) ** 2).mean()))
 
     assert error(clean) < error(raw) / 3
     assert clean.mean() == pytest.approx(truth.mean(), rel=0.03)
-    assert np.array_equal(clean, smoke.volume(*placed, smoke.VolumeSettings(**{**vars(few), "denoised": True})))
+    assert np.array_equal(clean, smoke.volume(*placed, denoised))

@@ -1,4 +1,4 @@
-"""render.layout: where panels, labels, insets and legends stand."""
+"""render.layout: positions of panels, labels, insets and legends."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from render import layout, lic, tonemap
 from render.layout import Panel
 
 
-def tone(value: int, height: int = 40, width: int = 60) -> np.ndarray:
+def grey(value: int, height: int = 40, width: int = 60) -> np.ndarray:
     return np.full((height, width, 3), value, np.uint8)
 
 
@@ -22,15 +22,16 @@ def test_panels_keep_their_pixels() -> None:
 
 
 def test_margin_and_gap_are_white() -> None:
-    page = layout.figure([[Panel(tone(0)), Panel(tone(0))]], margin=10, gap=7)
+    page = layout.figure([[Panel(grey(0)), Panel(grey(0))]], margin=10, gap=7)
     assert (page[:10] == 255).all()
     assert (page[:, 70:77] == 255).all()
     assert page.shape == (60, 147, 3)
 
 
-def test_panels_stand_on_one_baseline_and_under_each_other() -> None:
+def test_panels_of_a_row_and_of_a_column_are_aligned() -> None:
     """Columns 30 and 60 wide; the last row has one panel only and is centred."""
-    rows = [[Panel(tone(0, 20, 30)), Panel(tone(0))], [Panel(tone(0, 20, 20)), Panel(tone(0))], [Panel(tone(0))]]
+    large = Panel(grey(0))
+    rows = [[Panel(grey(0, 20, 30)), large], [Panel(grey(0, 20, 20)), large], [large]]
     page = layout.figure(rows, margin=0, gap=10)
     assert page.shape == (40 + 10 + 40 + 10 + 40, 30 + 10 + 60, 3)
     assert (page[:20, :30] == 255).all()
@@ -43,7 +44,7 @@ def test_panels_stand_on_one_baseline_and_under_each_other() -> None:
 def test_labels_shrink_until_they_fit_their_panel() -> None:
     """A grid keeps its columns under each other, whatever the labels say."""
     long = "a label that would be wider than it may be"
-    grid = [[Panel(tone(0, 100, 400), long), Panel(tone(0, 100, 400))]] * 2
+    grid = [[Panel(grey(0, 100, 400), long), Panel(grey(0, 100, 400))]] * 2
     assert layout.figure(grid, margin=0, gap=10).shape[1] == 810
     assert layout._fitting([("L", 400), (long, 400)], 26) < layout._fitting([("L", 400)], 26) == 26
     assert layout._fitting([(long, 10)], 26) == layout.LEGIBLE
@@ -54,7 +55,7 @@ def test_a_prime_stands_close_to_its_letter() -> None:
 
 
 def test_labels_are_dark_centred_and_below() -> None:
-    page = layout.figure([[Panel(tone(255, 40, 300), "coarse motion *L*", border=False)]], margin=0)
+    page = layout.figure([[Panel(grey(255, 40, 300), "coarse motion *L*", border=False)]], margin=0)
     ink = (255 - page[40:].astype(int)).sum(axis=(0, 2))
     assert page[40:].min() < 60
     assert (page[:40] == 255).all()
@@ -73,8 +74,8 @@ def test_lines_of_one_size_have_one_height_and_blanks_take_room() -> None:
     assert layout.lettering("a b", 26).shape[1] > layout.lettering("ab", 26).shape[1] + 3
 
 
-def test_inset_stands_lower_left_and_legend_lower_right() -> None:
-    panel = Panel(tone(100, 200, 300), inset=tone(0, 40, 40), legend=lic.wheel(50))
+def test_inset_is_lower_left_and_legend_lower_right() -> None:
+    panel = Panel(grey(100, 200, 300), inset=grey(0, 40, 40), legend=lic.wheel(50))
     page = layout.figure([[panel]], margin=0)
     left, right = page[150:, :60].astype(int), page[150:, 240:].astype(int)
     assert left.min() == 0
@@ -84,7 +85,7 @@ def test_inset_stands_lower_left_and_legend_lower_right() -> None:
 
 def test_an_inset_that_does_not_fit_is_refused() -> None:
     with pytest.raises(ValueError, match="does not fit"):
-        layout.figure([[Panel(tone(0), inset=tone(0))]])
+        layout.figure([[Panel(grey(0), inset=grey(0))]])
 
 
 def test_fitting_up_repeats_pixels_and_down_averages_light() -> None:

@@ -111,12 +111,15 @@ def test_linear_resampling_is_exact_on_a_ramp_and_the_identity_at_its_own_size()
     assert twice[3, 4] == pytest.approx(1.25 + 10.0 * 1.75)
 
 
-@pytest.mark.parametrize(("shape", "height", "width"), [((9, 7, 2), 31, 20), ((2, 2), 5, 3), ((30, 40, 3), 17, 23)])
+@pytest.mark.parametrize(("shape", "height", "width"), [
+    ((9, 7, 2), 31, 20), ((2, 2), 5, 3), ((30, 40, 3), 17, 23),
+])
 @pytest.mark.parametrize("order", [1, 3])
-def test_resampling_is_spline_interpolation(shape: tuple[int, ...], height: int, width: int, order: int) -> None:
+def test_resampling_is_spline_interpolation(shape: tuple[int, ...], height: int, width: int,
+                                            order: int) -> None:
     values = np.random.Generator(np.random.Philox(key=2)).standard_normal(shape).astype(np.float32)
-    where = np.meshgrid(*((np.arange(n) + 0.5) * (m / n) - 0.5 for n, m in zip((height, width), shape, strict=False)),
-                        indexing="ij")
+    sizes = ((height, shape[0]), (width, shape[1]))
+    where = np.meshgrid(*((np.arange(n) + 0.5) * (m / n) - 0.5 for n, m in sizes), indexing="ij")
     planes = values.reshape(*shape[:2], -1)
     expected = np.stack([ndimage.map_coordinates(planes[..., c], where, order=order, mode="nearest")
                          for c in range(planes.shape[2])], axis=-1)

@@ -1,4 +1,4 @@
-"""render.march: light whose amount is known in advance, then the kernels against NumPy, then the path tracer."""
+"""render.march: amounts of light known in advance, the kernels against NumPy, and the path tracer."""
 
 import dataclasses
 
@@ -10,8 +10,10 @@ from render.march import EmptyStudio, Grid, Lamp, Medium
 from synth import opencl
 
 MEDIUM = Medium((0.9, 0.8, 0.95), 0.2)
-KEY = Lamp(np.array([-3.0, 1.0, 0.3]), (np.array([0.0, 1.0, 0.0]), np.array([0.4, 0.0, 0.8])), (4.0, 3.0, 2.0))
-RIM = Lamp(np.array([1.5, 1.5, -2.5]), (np.array([0.0, 0.7, 0.0]), np.array([0.6, 0.0, 0.3])), (1.0, 2.0, 3.0))
+KEY_EDGES = np.array([0.0, 1.0, 0.0]), np.array([0.4, 0.0, 0.8])
+RIM_EDGES = np.array([0.0, 0.7, 0.0]), np.array([0.6, 0.0, 0.3])
+KEY = Lamp(np.array([-3.0, 1.0, 0.3]), KEY_EDGES, (4.0, 3.0, 2.0))
+RIM = Lamp(np.array([1.5, 1.5, -2.5]), RIM_EDGES, (1.0, 2.0, 3.0))
 EYE = np.array([0.2, 0.9, 5.0])
 DARK = np.zeros((6, 4, 3))
 SHAPES = [(5, 7, 3), (2, 2, 2), (4, 9, 6)]
@@ -28,7 +30,7 @@ def cloud(shape: tuple[int, int, int], voxel_size: float = 0.1) -> Grid:
 
 
 def slab(cells: int = 8) -> Grid:
-    """Extinction 2 per world unit, cells of 0.25, from -1.125 to 0.875 each way."""
+    """Extinction 2 per world unit, cells of 0.25, from -1.125 to 0.875 along each axis."""
     return Grid(np.full((cells, cells, cells), 0.5, np.float32), 0.25, np.array([-1.0, -1.0, -1.0]))
 
 
@@ -77,8 +79,8 @@ def through_all(grid: Grid, count: int) -> np.ndarray:
     return np.column_stack([offset / distance[:, None], length]).astype(np.float32)
 
 
-def test_beer_lambert_straight_and_aslant() -> None:
-    """Rays through the middle of a slab 2 thick: exp(-2 * 2), aslant the longer way; beside it, 1."""
+def test_beer_lambert_straight_and_slanted() -> None:
+    """Rays through the middle of a slab 2 thick: exp(-2 * 2), less along a slanted ray; 1 beside it."""
     grid = slab()
     unit = np.array([[0.0, 0.0, -1.0], [0.1, 0.0, -1.0], [0.9, 0.0, -1.0]])
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
@@ -94,8 +96,8 @@ def test_rays_end_at_surfaces_and_begin_where_they_begin() -> None:
     grid = slab()
     sent = opencl.to_device(sources(grid.sigma, 1.0))
     ahead = np.array([[0.0, 0.0, -1.0, 5.0 / 0.25]])
-    assert march.radiance(sent, grid.sigma.shape, ahead, grid.cells(np.array([0.0, 0.0, 5.0])))[0, 3] == pytest.approx(
-        np.exp(-2.0 * 0.875), rel=1e-4)
+    outside = march.radiance(sent, grid.sigma.shape, ahead, grid.cells(np.array([0.0, 0.0, 5.0])))
+    assert outside[0, 3] == pytest.approx(np.exp(-2.0 * 0.875), rel=1e-4)
     inside = march.radiance(sent, grid.sigma.shape, ahead, grid.cells(np.array([0.0, 0.0, 0.1])))
     assert inside[0, 3] == pytest.approx(np.exp(-2.0 * 1.225), rel=1e-4)
 
@@ -109,8 +111,9 @@ def test_lamplight_fades_by_beer_lambert_from_every_side(towards: tuple[float, f
     point = middle + np.array(towards)
     facing = np.array(towards) / np.linalg.norm(towards)
     even = Medium((0.9, 0.9, 0.9), 0.0)
-    _, spread = march.arriving(opencl.to_device(grid.sigma), grid.sigma.shape, grid.cells(point[None]), facing, 1.0,
-                               grid.cells(EYE), even)
+    sigma = opencl.to_device(grid.sigma)
+    lamp, eye = grid.cells(point[None]), grid.cells(EYE)
+    _, spread = march.arriving(sigma, grid.sigma.shape, lamp, facing, 1.0, eye, even)
     axis = int(np.argmax(np.abs(towards)))
     line = np.moveaxis(spread.get(), 2 - axis, 0)[:, 3, 3] * (np.linalg.norm(towards) / 0.01) ** 2
     cells = np.arange(6)[::-1] if towards[axis] > 0 else np.arange(6)
@@ -127,7 +130,8 @@ def test_no_smoke_shows_the_empty_studio_exactly_and_full_light_falls_on_it() ->
 def small_studio() -> EmptyStudio:
     rays = studio.Camera(position=(0.2, 0.9, 5.0), target=(0.0, 0.5, 0.0), fov=14.0).rays(6, 8)
     distance = 5.5 + random(8, 6, seed=5)
-    return EmptyStudio(EYE, rays, distance, random(3, 8, 6, 3, seed=6).astype(np.float32), random(6, 4, 3, seed=7))
+    layers = random(3, 8, 6, 3, seed=6).astype(np.float32)
+    return EmptyStudio(EYE, rays, distance, layers, random(6, 4, 3, seed=7))
 
 
 def test_a_mirrored_scene_gives_the_mirrored_picture() -> None:
@@ -137,9 +141,9 @@ def test_a_mirrored_scene_gives_the_mirrored_picture() -> None:
         return Lamp(flip * lamp.corner, (flip * lamp.edges[0], flip * lamp.edges[1]), lamp.radiance)
 
     def other(empty: EmptyStudio) -> EmptyStudio:
-        vectors = march.directions() * np.array([-1.0, 1.0, 1.0])
-        place = [int(np.abs(march.directions().reshape(-1, 3) - v).sum(1).argmin()) for v in vectors.reshape(-1, 3)]
         flip = np.array([-1.0, 1.0, 1.0])
+        vectors = march.directions().reshape(-1, 3)
+        place = [int(np.abs(vectors - v).sum(1).argmin()) for v in vectors * flip]
         return EmptyStudio(flip * empty.eye, flip * empty.rays[:, ::-1], empty.distance[:, ::-1],
                            empty.layers[:, :, ::-1], empty.border.reshape(24, 3)[place].reshape(6, 4, 3))
 
@@ -154,10 +158,12 @@ def test_a_mirrored_scene_gives_the_mirrored_picture() -> None:
 def test_the_shadow_lies_away_from_the_lamp_and_is_soft() -> None:
     """A dense block under a lamp: dark below it, light far off, and a penumbra between."""
     grid = Grid(np.full((4, 4, 4), 3.0, np.float32), 0.05, np.array([-0.075, 0.5, -0.075]))
-    lamp = Lamp(np.array([-0.5, 3.0, -0.5]), (np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])), (1.0,) * 3)
+    edges = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    points = Lamp(np.array([-0.5, 3.0, -0.5]), edges, (1.0,) * 3).points(6)
     places = np.zeros((41, 3))
     places[:, 0] = np.linspace(-0.5, 0.5, 41)
-    share = march.shade(opencl.to_device(grid.sigma), grid.sigma.shape, grid.cells(places), grid.cells(lamp.points(6)))
+    sigma = opencl.to_device(grid.sigma)
+    share = march.shade(sigma, grid.sigma.shape, grid.cells(places), grid.cells(points))
     assert share[20] < 0.01 and share[0] == share[-1] == 1.0
     assert ((share > 0.05) & (share < 0.95)).sum() >= 4
     assert share == pytest.approx(share[::-1], abs=1e-5)
@@ -169,7 +175,7 @@ def test_the_same_bits_each_time() -> None:
     assert np.array_equal(first, again)
 
 
-def test_a_lamp_in_the_smoke_is_refused() -> None:
+def test_a_lamp_inside_the_smoke_is_refused() -> None:
     inside = dataclasses.replace(KEY, corner=np.array([0.0, 0.5, 0.0]) - 0.5 * sum(KEY.edges))
     with pytest.raises(ValueError, match="a lamp is inside the smoke"):
         march.source(cloud((5, 7, 6)), [inside], EYE, MEDIUM, DARK)
@@ -180,10 +186,11 @@ def test_a_lamp_in_the_smoke_is_refused() -> None:
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_source_equals_its_reference(shape: tuple[int, int, int]) -> None:
-    """All that light does before the rays: both lamps, the halving, the bounces at both sizes, the refining."""
+    """All light transport before the rays: both lamps, halving, the bounces at both sizes, refining."""
     grid, border = cloud(shape), random(6, 4, 3, seed=4)
     made = march.source(grid, [KEY, RIM], EYE, MEDIUM, border).get()
-    assert made == pytest.approx(march.source_reference(grid, [KEY, RIM], EYE, MEDIUM, border), rel=1e-4, abs=1e-7)
+    expected = march.source_reference(grid, [KEY, RIM], EYE, MEDIUM, border)
+    assert made == pytest.approx(expected, rel=1e-4, abs=1e-7)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -204,7 +211,7 @@ def test_radiance_and_shade_equal_their_references(shape: tuple[int, int, int]) 
 
 
 def test_a_march_comes_near_many_paths() -> None:
-    """The studio with a cloud of large cells: smoke and studio within 6 % in the mean, and correlated pixel by pixel.
+    """The studio with a cloud of large cells: means of smoke and picture within 6 %, pixels correlated.
 
     What is left is the size of the cells and the light that the smoke throws on the studio.
     """

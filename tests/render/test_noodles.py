@@ -1,4 +1,4 @@
-"""Noodles on a plate: the picture repeats, the plate lies where noodles do, and light comes through."""
+"""Noodles on a plate: bits repeat, the plate is below the noodles, and dough is translucent."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,8 @@ def test_a_view_shows_the_whole_plate() -> None:
     assert radius == pytest.approx(noodles.MARGIN * 0.3)
     m = rods()
     shot = studio.Shot(64, 36, 9, camera=camera)
-    seen, bare = (noodles.picture(m.vertices - 50, m.faces, m.colours, shot, plate) for plate in (radius, 0.0))
+    hidden = m.vertices - 50, m.faces, m.colours
+    seen, bare = (noodles.picture(*hidden, shot, plate) for plate in (radius, 0.0))
     dish = seen.mean(-1) > 2.5 * bare.mean(-1)
     assert dish.any() and not (dish[0] | dish[-1]).any() and not (dish[:, 0] | dish[:, -1]).any()
 
@@ -56,15 +57,16 @@ def test_the_plate_is_closed_below_flat_where_noodles_lie_and_above_the_table() 
 
 
 def test_light_comes_through_dough() -> None:
-    """A wall between the eye and a lamp is not black."""
+    """A wall between the camera and a lamp is not black."""
     mi = backend.mitsuba("llvm_ad_rgb")
     wall = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     camera = studio.Camera(position=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0), fov=8.0)
     lamp = studio.Softbox((0.0, 0.0, -3.0), (0.0, 0.0, 0.0), (1.0, 1.0), (9.0, 9.0, 9.0), 1.0)
-    scene = mi.load_dict({
-        "type": "scene", "sensor": mitsuba_shapes.sensor(mi, camera, 8, 8), "lamp": mitsuba_shapes.lamp(mi, lamp),
-        "wall": mitsuba_shapes.shape(mi, "wall", wall, faces, np.full((4, 3), [0.9, 0.7, 0.3]), noodles.dough())})
-    seen = np.array(mi.render(scene, integrator=mi.load_dict({"type": "path", "max_depth": 3}), spp=64, seed=1))
+    colours = np.full((4, 3), [0.9, 0.7, 0.3])
+    scene = {"sensor": mitsuba_shapes.sensor(mi, camera, 8, 8), "lamp": mitsuba_shapes.lamp(mi, lamp),
+             "wall": mitsuba_shapes.shape(mi, "wall", wall, faces, colours, noodles.dough())}
+    path = mi.load_dict({"type": "path", "max_depth": 3})
+    seen = mitsuba_shapes.rendered(mi, scene, path, studio.Shot())
     red, green, blue = seen.mean((0, 1))
     assert red > green > blue > 0.01

@@ -1,4 +1,4 @@
-"""The river: where a particle is drawn, how much of it, and what is in front of what."""
+"""The river: position and opacity of foam, stones and their shadows."""
 
 import numpy as np
 import pytest
@@ -14,12 +14,14 @@ DARK = np.zeros((60, 80, 3), np.float32)
 def drawn(position, velocity, age=30, back=DARK, open_water=CLEAR, streak=0.0):
     """One or more particles on a picture of 80 x 60."""
     position, velocity = np.float32(np.atleast_2d(position)), np.float32(np.atleast_2d(velocity))
-    return particles.river(position, velocity, np.full(len(position), age, np.int32), 60, back, open_water, DOMAIN,
-                           streak, 0.5)
+    ages = np.full(len(position), age, np.int32)
+    return particles.river(position, velocity, ages, 60, back, open_water, DOMAIN, streak, 0.5)
 
 
-@pytest.mark.parametrize(("at", "row", "column"), [((0.0, 0.5), 30, 40), ((-0.6, 0.1), 54, 4), ((0.5, 0.9), 6, 70)])
-def test_a_particle_is_where_it_is(at, row, column):
+@pytest.mark.parametrize(("at", "row", "column"), [
+    ((0.0, 0.5), 30, 40), ((-0.6, 0.1), 54, 4), ((0.5, 0.9), 6, 70),
+])
+def test_a_particle_is_drawn_at_its_position(at, row, column):
     light = drawn(at, (0.3, 0.0)).sum(-1)
     y, x = np.mgrid[:60, :80] + 0.5
     assert light.sum() > 0
@@ -63,7 +65,7 @@ def test_a_stone_covers_its_share_of_each_pixel():
     open_water = particles.shown(distance, 80)
     assert open_water.shape == (60, 80)
     assert (1 - open_water).sum() == pytest.approx(np.pi * 12**2, rel=0.02)
-    assert open_water[24, 46] == 0 and open_water[50, 46] == 1  # y up: it stands above the middle
+    assert open_water[24, 46] == 0 and open_water[50, 46] == 1  # y up: it is above the middle
 
 
 def test_a_stone_rises_from_its_waterline():

@@ -1,4 +1,4 @@
-"""A school: the picture repeats, fish are seen, and the far ones fade."""
+"""A school: bits repeat, fish are visible and fade with distance."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ SMALL = studio.Shot(width=64, height=36, spp=4)
 
 
 def shown(distance: float, count: int = 5) -> Mesh:
-    """Large fish abreast, at a share of the way from the eye to what it looks at, and beyond."""
+    """Large fish side by side, at a multiple of the distance from the camera to its target."""
     eye, target = np.array(school.CAMERA.position), np.array(school.CAMERA.target)
     middle = eye + distance * (target - eye)
     spread = np.linspace(-0.2, 0.2, count)[:, None] * [0.0, distance, 0.0]

@@ -1,16 +1,16 @@
-"""Seaweed under water: a picture repeats, and the distance takes all of it."""
+"""Seaweed under water: bits repeat, and blades fade with distance."""
 
 import numpy as np
 import pytest
 
 from render import seaweed, studio
 
-LOOK = studio.Camera(position=(0.0, 0.5, 3.0), target=(0.0, 0.5, 0.0), fov=30.0)
-SMALL = studio.Shot(width=32, height=24, spp=8, camera=LOOK)
+CAMERA = studio.Camera(position=(0.0, 0.5, 3.0), target=(0.0, 0.5, 0.0), fov=30.0)
+SMALL = studio.Shot(width=32, height=24, spp=8, camera=CAMERA)
 
 
 def board(z: float, size: float = 0.3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A white square that stands at z."""
+    """An upright white square at z."""
     corners = np.array([[-1, 0, 0], [1, 0, 0], [1, 2, 0], [-1, 2, 0]], np.float32) * size + [0, 0.2, z]
     return corners.astype(np.float32), np.array([[0, 1, 2], [0, 2, 3]]), np.full((4, 3), 255, np.uint8)
 

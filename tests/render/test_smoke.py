@@ -1,4 +1,4 @@
-"""render.smoke: pictures whose light is known in advance, and what is refused."""
+"""render.smoke: pictures whose light is known in advance, and invalid densities."""
 
 import numpy as np
 import pytest
@@ -70,9 +70,10 @@ def test_lit_shows_detail_inside_opaque_smoke() -> None:
 
 
 @pytest.mark.parametrize("bad", [
-    np.zeros((4, 4, 4)), np.zeros((1, 4)), np.full((4, 4), np.nan), np.full((4, 4), np.inf), np.full((4, 4), -1.0),
+    np.zeros((4, 4, 4)), np.zeros((1, 4)),
+    np.full((4, 4), np.nan), np.full((4, 4), np.inf), np.full((4, 4), -1.0),
 ])
-def test_what_is_no_density_is_refused(bad: np.ndarray) -> None:
+def test_an_invalid_density_is_refused(bad: np.ndarray) -> None:
     for draw in (smoke.lit, smoke.ink):
         with pytest.raises(ValueError, match="density"):
             draw(bad, 32)

@@ -1,4 +1,4 @@
-"""render.smoke_slab: the kernels against their NumPy reference, and light whose result is known in advance."""
+"""render.smoke_slab: the kernels against their NumPy reference, and results known in advance."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,8 @@ def test_shadow_falls_away_from_the_light() -> None:
 def test_kernels_equal_their_reference(shape: tuple[int, int]) -> None:
     rng = np.random.Generator(np.random.Philox(key=8))
     depth, relief = 6.0 * rng.random(shape, dtype=np.float32), 1.2 * rng.random(shape, dtype=np.float32)
-    got, expected = (run(depth, relief, 1.7, LAMPS, 2) for run in (smoke_slab.light, smoke_slab.light_reference))
+    got = smoke_slab.light(depth, relief, 1.7, LAMPS, 2)
+    expected = smoke_slab.light_reference(depth, relief, 1.7, LAMPS, 2)
     assert got.passed == pytest.approx(expected.passed, abs=2e-6)
     assert got.sky == pytest.approx(expected.sky, abs=2e-6)
     for one, other in zip(got.lamps, expected.lamps, strict=True):
@@ -51,7 +52,7 @@ def test_kernels_repeat_bit_for_bit() -> None:
     assert all(np.array_equal(a, b) for a, b in zip(first.lamps, second.lamps, strict=True))
 
 
-def test_no_smoke_is_passed_and_not_seen() -> None:
+def test_without_smoke_all_light_passes() -> None:
     seen = smoke_slab.light(np.zeros((6, 5), np.float32), np.ones((6, 5), np.float32), 2.0, LAMPS, 1)
     assert (seen.passed == 1.0).all()
     assert not seen.sky.any() and not any(lamp.any() for lamp in seen.lamps)
@@ -66,7 +67,7 @@ def test_a_full_slab_obeys_beer_lambert_and_a_thin_one_holds_less_smoke() -> Non
 
 
 def test_thin_smoke_shows_a_lamp_in_proportion_to_what_it_hides() -> None:
-    """In the limit of thin smoke nothing is shadowed: seen light = 1 - passed, whichever side the lamp is on."""
+    """In the limit of thin smoke nothing is shadowed: light = 1 - passed, on whichever side the lamp is."""
     depth = np.full((8, 8), 1e-3, np.float32)
     seen = smoke_slab.light(depth, np.full_like(depth, 1.1), 1.0, LAMPS, 1)
     for lamp in seen.lamps:
@@ -84,13 +85,14 @@ def test_a_lamp_in_front_shows_more_of_thick_smoke_than_one_behind() -> None:
 def test_a_ridge_is_bright_towards_the_lamp_and_dark_behind() -> None:
     """A ridge along y, lit from the left: its left flank is brighter than its right one."""
     x = np.arange(60)
-    relief = np.broadcast_to((0.3 + 0.7 * np.exp(-(((x - 30) / 8.0) ** 2))).astype(np.float32), (20, 60)).copy()
+    profile = (0.3 + 0.7 * np.exp(-(((x - 30) / 8.0) ** 2))).astype(np.float32)
+    relief = np.broadcast_to(profile, (20, 60)).copy()
     lamp = smoke_slab.Lamp(((-1.0, 0.0),), slope=2.0, density=1.0)
     seen = smoke_slab.light(np.full_like(relief, 8.0), relief, 1.5, (lamp,), 1).lamps[0][10]
     assert seen[20:28].mean() > 1.3 * seen[32:40].mean()
 
 
-def test_moving_reads_where_it_is_told_and_outside_beyond() -> None:
+def test_moved_reads_at_the_offset_and_outside_beyond_the_border() -> None:
     values = np.arange(12.0, dtype=np.float32).reshape(3, 4)
     assert np.array_equal(smoke_slab.moved(values, 0.0, 0.0, 9.0), values)
     assert np.array_equal(smoke_slab.moved(values, 1.0, -1.0, 9.0)[1:, :3], values[:2, 1:])

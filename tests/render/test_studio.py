@@ -1,4 +1,4 @@
-"""render.studio: meshes that are closed where they should be and stand where they should."""
+"""render.studio: meshes are consistent and in their place; cameras see what they should."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_the_backdrop_is_smooth_and_its_floor_is_at_zero() -> None:
     assert backdrop.vertices[:, 1].min() == 0.0
 
 
-def test_rays_of_the_view_go_where_the_camera_looks() -> None:
+def test_rays_go_through_the_pixels_of_the_camera() -> None:
     camera = studio.Camera(position=(0.0, 0.0, 4.0), target=(0.0, 0.0, 0.0), fov=90.0)
     rays = camera.rays(4, 2)
     assert rays[0, 0] == pytest.approx([-1.5, 0.5, -1.0])  # top row first, left first
@@ -62,16 +62,16 @@ def test_the_edges_of_a_softbox_lie_in_its_face() -> None:
         assert [np.linalg.norm(edge) for edge in box.edges] == pytest.approx(box.size)
         assert level[1] == 0.0 and upright[1] > 0.0
         assert level @ upright == pytest.approx(0.0, abs=1e-9)
-        assert level @ facing == pytest.approx(0.0, abs=1e-9) and upright @ facing == pytest.approx(0.0, abs=1e-9)
+        assert level @ facing == pytest.approx(0.0, abs=1e-9)
+        assert upright @ facing == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_raised_camera_looks_at_the_same_place_from_as_far() -> None:
+def test_a_raised_camera_keeps_its_target_and_distance() -> None:
     low, high = studio.CAMERA, studio.raised(60.0)
-    target = np.array(low.target)
     assert high.target == low.target and high.fov == low.fov
-    away = np.array(high.position) - target
-    assert np.linalg.norm(away) == pytest.approx(np.linalg.norm(np.array(low.position) - target))
-    assert np.degrees(np.arcsin(away[1] / np.linalg.norm(away))) == pytest.approx(60.0)
+    offset = np.array(high.position) - np.array(low.target)
+    assert high.distance == pytest.approx(low.distance)
+    assert np.degrees(np.arcsin(offset[1] / high.distance)) == pytest.approx(60.0)
 
 
 def test_a_placed_box_fills_the_middle_of_the_picture() -> None:
@@ -80,7 +80,8 @@ def test_a_placed_box_fills_the_middle_of_the_picture() -> None:
     corners = studio.placed(np.stack([low, high]), low, high, camera, 1.5)
     view = 2 * 4 * np.tan(np.radians(15.0))
     assert corners.mean(0) == pytest.approx(camera.target, abs=1e-6)
-    assert np.ptp(corners[:, 0]) == pytest.approx(studio.FILLED * 1.5 * view)  # twice as wide as high: width decides
+    # twice as wide as high: the width decides
+    assert np.ptp(corners[:, 0]) == pytest.approx(studio.FILLED * 1.5 * view)
     assert np.ptp(corners[:, 1]) == pytest.approx(studio.FILLED * 0.75 * view)
 
 
@@ -94,7 +95,30 @@ def test_a_framed_box_is_seen_whole_and_fills_the_picture() -> None:
     right, up = rays[0, 2] - rays[0, 1], rays[0, 1] - rays[1, 1]
     seen = corners - np.array(camera.position)
     seen /= (seen @ ahead)[:, None]
-    across, above = seen @ right / (right @ right) / 1.5, seen @ up / (up @ up)  # 1 pixel is 1 / 1.5 of half a picture
+    # in halves of the picture, which are 1.5 pixels wide and 1 pixel high
+    across, above = seen @ right / (right @ right) / 1.5, seen @ up / (up @ up)
     assert max(np.abs(across).max(), np.abs(above).max()) == pytest.approx(studio.FILLED, rel=1e-6)
     old = np.array(studio.CAMERA.target) - np.array(studio.CAMERA.position)
     assert ahead == pytest.approx(old / np.linalg.norm(old))
+
+
+def test_the_studio_fits_what_a_camera_sees() -> None:
+    """A camera three times as far with the same lens: everything becomes a third, around its target."""
+    far = studio.Camera((2.0, 3 * 0.92, 3 * 6.2 + 1), (2.0, 3 * 0.475, 1.0), studio.CAMERA.fov)
+    points = np.array([[2.0, 0.0, 1.0], [5.0, 3.0, 1.0]])
+    vertices, camera, scale = studio.in_studio(points, far, studio.CAMERA)
+    assert scale == pytest.approx(1 / 3)
+    assert vertices == pytest.approx(np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]), abs=1e-6)
+    assert camera.position == pytest.approx(studio.CAMERA.position)
+    assert camera.target == pytest.approx(studio.CAMERA.target)
+
+
+def test_a_shot_has_the_aspect_of_its_picture() -> None:
+    assert studio.Shot().aspect == pytest.approx(16 / 9) and studio.SHOT.camera is None
+
+
+def test_a_mesh_moves_as_a_whole() -> None:
+    moved = studio.backdrop().moved(1.0, 2.0, 3.0)
+    shift = moved.vertices - studio.backdrop().vertices
+    assert shift == pytest.approx(np.broadcast_to([1.0, 2.0, 3.0], shift.shape), abs=1e-6)
+    assert moved.vertices.dtype == np.float32

@@ -13,9 +13,9 @@ def test_srgb_values_of_the_standard() -> None:
 
 
 def test_filmic_never_decreases_and_leaves_room_above_one() -> None:
-    tones = tonemap.filmic(np.linspace(0.0, 10.0, 2001))
-    assert tones[0] == 0.0
-    assert (np.diff(tones) >= 0.0).all()
+    curve = tonemap.filmic(np.linspace(0.0, 10.0, 2001))
+    assert curve[0] == 0.0
+    assert (np.diff(curve) >= 0.0).all()
     assert tonemap.filmic(np.array([1.0]))[0] < 0.9
 
 
@@ -23,9 +23,8 @@ def test_straight_keeps_white_paper_white() -> None:
     assert tonemap.to_display(np.ones((2, 3, 3)), "straight") == pytest.approx(1.0)
 
 
-def test_dither_keeps_the_mean_of_a_tone_between_two_steps_and_hides_the_step() -> None:
-    tone = 100.3 / 255.0
-    page = tonemap.eight_bit(np.full((200, 200, 3), tone))
+def test_dither_keeps_the_mean_of_a_value_between_two_steps_and_hides_the_step() -> None:
+    page = tonemap.eight_bit(np.full((200, 200, 3), 100.3 / 255.0))
     assert page.dtype == np.uint8
     assert abs(page.mean() - 100.3) < 0.02
     assert len(np.unique(page)) >= 3
