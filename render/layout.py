@@ -139,11 +139,11 @@ def figure(rows: Sequence[Sequence[Panel]], *, letter: int | None = None, gap: i
            margin: int = 28) -> np.ndarray:
     """Panels in rows as one picture (h, w, 3) uint8 sRGB on white.
 
-    letter       size of the labels, pixels; None: a twentieth of the widest panel, or less where a label would be wider
-                 than its panel
+    letter       size of the labels, pixels; None: a twentieth of the widest panel, or less where a label would
+                 be wider than its panel
     gap, margin  between panels and around the figure, pixels
-    Panels keep their pixels; those of a row are aligned at the bottom, and rows with the same number of panels share
-    their columns.
+    Panels keep their pixels. Those of a row are aligned at the bottom; rows with the same number of panels
+    share their columns.
     """
     if not rows or not all(rows):
         raise ValueError("a figure needs at least one panel in each row")

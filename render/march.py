@@ -1,9 +1,9 @@
 """Smoke rendered without noise: light transport on a grid, then one ray per pixel; kernels in march.cl.
 
-    arriving   the light of the lamps that reaches each cell, by a sweep through the grid away from each point of a lamp
-    scattered  the light that the cells then scatter to each other, at half the resolution: discrete ordinates with the
-               24 directions of S4 [Carlson and Lathrop 1965], along short characteristics on which the source function
-               is linear in optical depth, up to a fixed number of bounces
+    arriving   the light of the lamps that reaches each cell, by a sweep away from each point of a lamp
+    scattered  the light that the cells then scatter to each other, at half the resolution: discrete ordinates
+               with the 24 directions of S4 [Carlson and Lathrop 1965], along short characteristics on which
+               the source function is linear in optical depth, up to a fixed number of bounces
     source     both together: the light that each cell scatters to the eye
     radiance   integrated front to back along the rays of the picture
     shade      the share of a lamp's light that passes the smoke and falls on the surfaces around it
@@ -39,7 +39,8 @@ SLOPE, HALF_STEP = MU / ETA, 0.5 / ETA  # of a direction, from one plane of cell
 
 @dataclass(frozen=True)
 class Grid:
-    """sigma: (Z, Y, X) float32, extinction per cell; origin: centre of cell (0, 0, 0), world units, x, y, z."""
+    """sigma: (Z, Y, X) float32, extinction per cell; voxel_size: edge of a cell, world units; origin: (x, y, z),
+    centre of cell (0, 0, 0), world units."""
 
     sigma: np.ndarray
     voxel_size: float
@@ -446,9 +447,9 @@ class EmptyStudio:
     eye       (3,) position of the camera, world units
     rays      (h, w, 3) from it through the pixels, of any length
     distance  (h, w) to the surface that a ray meets
-    layers    (lamps + 1, h, w, 3) the light of each lamp that the surfaces send to the camera, then all other light
-    border    (6, 4, 3) the light that reaches the middle of the studio from each of `directions`, without what
-              comes straight from the lamps
+    layers    (lamps + 1, h, w, 3) the picture by the light of each lamp, then by all other light
+    border    (6, 4, 3) the light that reaches the middle of the studio from each of `directions`, without
+              what comes straight from the lamps
     """
 
     eye: np.ndarray
@@ -483,7 +484,7 @@ class Seen:
 
 
 def seen(grid: Grid, lamps: Sequence[Lamp], medium: Medium, empty: EmptyStudio) -> Seen:
-    """What a camera sees of smoke in a studio. Shadows are soft: each place is tested against every point of a lamp."""
+    """What a camera sees of smoke in a studio; shadows are soft, from many points of each lamp."""
     height, width = empty.distance.shape
     shape = grid.sigma.shape
     length = np.linalg.norm(empty.rays, axis=-1, keepdims=True)

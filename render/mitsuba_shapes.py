@@ -122,8 +122,8 @@ def every_lamp(mi: Any, bounces: int, split: int = 1) -> Any:
     """An integrator for scenes with few lamps: at every vertex of a path, every lamp is sampled.
 
     bounces  indirect bounces; split: paths that continue from the first surface a camera ray hits
-    A path tracer picks one lamp at random at each vertex: more noise for the same number of rays. Environment light
-    (a constant emitter) is found by BSDF sampling only.
+    A path tracer picks one lamp at random at each vertex: more noise for the same number of rays. Environment
+    light (a constant emitter) is found by BSDF sampling only.
     """
     dr = backend.drjit()
     context = mi.BSDFContext()

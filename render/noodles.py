@@ -12,7 +12,6 @@ World units: the plate's well is at y = 0, a plate of noodles about one unit wid
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,7 @@ MARGIN = 1.45  # radius of a plate over the extent of the noodles
 BOUNCES = 2
 
 # dough
-THROUGH = 0.30  # weight of the translucent part of the BSDF
+TRANSLUCENCY = 0.30  # weight of the translucent part of the BSDF
 GLOSS = {"roughness": 0.30, "specular": 0.5, "clearcoat": 1.0, "clearcoat_gloss": 0.93}  # oil
 
 
@@ -45,7 +44,7 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray,
     own = shot.camera or CAMERA
     vertices, camera, scale = studio.in_studio(vertices, own, CAMERA)
     at = (-own.target[0] * scale, -own.target[2] * scale)
-    return _traced(vertices, faces, colours, replace(shot, camera=camera), TABLE_LEVEL, plate * scale, at)
+    return _traced(vertices, faces, colours, shot, camera, TABLE_LEVEL, plate * scale, at)
 
 
 def view(low: np.ndarray, high: np.ndarray, aspect: float) -> tuple[studio.Camera, float]:
@@ -68,15 +67,15 @@ def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.
     camera = shot.camera or CAMERA
     level = float(studio.placed(np.stack([low, high]), low, high, camera, shot.aspect)[0, 1])
     placed = studio.placed(vertices, low, high, camera, shot.aspect)
-    return _traced(placed, faces, colours, replace(shot, camera=camera), level, 0.0)
+    return _traced(placed, faces, colours, shot, camera, level, 0.0)
 
 
-def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: studio.Shot, level: float,
-            radius: float, at: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: studio.Shot,
+            camera: studio.Camera, level: float, radius: float, at: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
     """Noodles over a table at y = level, and on a plate centred on `at` (x, z) unless its radius is 0."""
     mi = backend.mitsuba("llvm_ad_rgb")
     scene = {
-        "sensor": mitsuba_shapes.sensor(mi, shot.camera or CAMERA, shot.width, shot.height),
+        "sensor": mitsuba_shapes.sensor(mi, camera, shot.width, shot.height),
         "window": mitsuba_shapes.lamp(mi, WINDOW), "fill": mitsuba_shapes.lamp(mi, FILL),
         "air": mitsuba_shapes.sky(AIR),
         "noodles": mitsuba_shapes.painted(mi, "noodles", vertices, faces, colours, dough()),
@@ -95,7 +94,7 @@ def dough() -> dict[str, Any]:
     """The BSDF of noodles, in the colours of the vertices."""
     colour = mitsuba_shapes.VERTEX_COLOUR
     return {
-        "type": "blendbsdf", "weight": THROUGH,
+        "type": "blendbsdf", "weight": TRANSLUCENCY,
         "outside": {"type": "twosided", "bsdf": {"type": "principled", "base_color": colour, **GLOSS}},
         "through": {"type": "principledthin", "base_color": colour, "roughness": 0.4, "diff_trans": 1.7, "eta": 1.3},
     }

@@ -8,7 +8,6 @@ World units: floor at y = 0, the scene about one unit high, centred on x = z = 0
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,7 @@ def picture(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: 
     vertices (N, 3) float32, world units; faces (M, 3) int, one layer for each sheet; colours (N, 3) uint8, sRGB
     """
     vertices, camera, _ = studio.in_studio(vertices, shot.camera or CAMERA, CAMERA)
-    return _traced(vertices, faces, colours, replace(shot, camera=camera), 0.0)
+    return _traced(vertices, faces, colours, shot, camera, 0.0)
 
 
 def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.ndarray, high: np.ndarray,
@@ -43,16 +42,16 @@ def inset(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, low: np.
     camera = shot.camera or CAMERA
     box = studio.placed(np.stack([low, high]), low, high, camera, shot.aspect)
     placed = studio.placed(vertices, low, high, camera, shot.aspect)
-    return _traced(placed, faces, colours, replace(shot, camera=camera), min(0.0, float(box[0, 1]) - CLEARANCE))
+    return _traced(placed, faces, colours, shot, camera, min(0.0, float(box[0, 1]) - CLEARANCE))
 
 
 def _traced(vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray, shot: studio.Shot,
-            level: float) -> np.ndarray:
+            camera: studio.Camera, level: float) -> np.ndarray:
     """Sheets over a floor at y = level."""
     mi = backend.mitsuba("llvm_ad_rgb")
     ground = studio.backdrop().moved(0.0, level, 0.0)
     scene = {
-        "sensor": mitsuba_shapes.sensor(mi, shot.camera or CAMERA, shot.width, shot.height),
+        "sensor": mitsuba_shapes.sensor(mi, camera, shot.width, shot.height),
         "sun": mitsuba_shapes.lamp(mi, SUN), "fill": mitsuba_shapes.lamp(mi, FILL),
         "air": mitsuba_shapes.sky(AIR),
         "paper": mitsuba_shapes.painted(mi, "paper", vertices, faces, colours, paper()),

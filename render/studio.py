@@ -136,9 +136,9 @@ def framing(low: np.ndarray, high: np.ndarray, camera: Camera, aspect: float) ->
 
 
 def in_studio(vertices: np.ndarray, camera: Camera, usual: Camera) -> tuple[np.ndarray, Camera, float]:
-    """Vertices (N, 3) and camera, scaled until the camera sees as much as the `usual` one, and translated until its
-    target is above x = z = 0; and the scale. So lamps and backdrop fit subjects of any size; the floor stays at y = 0.
-    """
+    """Vertices (N, 3) and camera, scaled until the camera sees as much as the `usual` one and translated until
+    its target is above x = z = 0; and the scale. So lamps and backdrop fit subjects of any size. The floor stays
+    at y = 0."""
     extent, usual_extent = (c.distance * float(np.tan(np.radians(c.fov) / 2)) for c in (camera, usual))
     scale = usual_extent / extent
     shift = np.array([camera.target[0], 0.0, camera.target[2]])

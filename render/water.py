@@ -3,7 +3,7 @@
     Water          the optical properties of the water
     caustics       the sunlight on the floor
     sun, sky       the lights; sand, floor: the floor
-    through_water  the integrator: light reflected by surfaces, and the water between them and the eye, with the sun's
+    through_water  the integrator: light reflected by surfaces, and the water in front of them with the sun's
                    shafts, computed per ray
     rendered       the picture of shapes under water
 
