@@ -20,7 +20,7 @@ class OpenCLUnavailable(RuntimeError):
     """No OpenCL platform offers a device; the message says what to install."""
 
 
-MENDING = "install Debian's pocl-opencl-icd (apt-get install pocl-opencl-icd)"
+INSTALL = "install Debian's pocl-opencl-icd (apt-get install pocl-opencl-icd)"
 
 
 @functools.cache
@@ -33,17 +33,17 @@ def _queue() -> Any:
     except ImportError as error:
         raise OpenCLUnavailable(f"pyopencl cannot be loaded ({error}); run make setup") from error
     except cl.Error as error:
-        raise OpenCLUnavailable(f"no OpenCL platform ({error}); {MENDING}") from error
+        raise OpenCLUnavailable(f"no OpenCL platform ({error}); {INSTALL}") from error
     devices = [d for p in sorted(platforms, key=lambda p: p.version, reverse=True) for d in p.get_devices()]
     if not devices:
-        raise OpenCLUnavailable(f"no OpenCL device; {MENDING}")
-    wanted = os.environ.get("FLOWLOOM_DEVICE", "")
-    if wanted:
-        named = [d for d in devices if wanted.lower() in f"{d.platform.name} {d.name}".lower()]
-        if not named:
+        raise OpenCLUnavailable(f"no OpenCL device; {INSTALL}")
+    requested = os.environ.get("FLOWLOOM_DEVICE", "")
+    if requested:
+        matching = [d for d in devices if requested.lower() in f"{d.platform.name} {d.name}".lower()]
+        if not matching:
             names = ", ".join(f"{d.platform.name}: {d.name}" for d in devices)
-            raise OpenCLUnavailable(f"FLOWLOOM_DEVICE={wanted!r} matches none of: {names}")
-        devices = named
+            raise OpenCLUnavailable(f"FLOWLOOM_DEVICE={requested!r} matches none of: {names}")
+        devices = matching
     devices.sort(key=lambda d: not d.type & cl.device_type.GPU)
     return cl.CommandQueue(cl.Context(devices[:1]))
 

@@ -118,8 +118,8 @@ def _plant(species: Species, place: np.ndarray, height: float, rng: np.random.Ge
     outward = np.stack([np.cos(azimuth), np.zeros(n), np.sin(azimuth)], 1)
     up = np.array([0.0, 1.0, 0.0])
     direction = np.cos(lean)[:, None] * up + np.sin(lean)[:, None] * outward
-    turn = azimuth + np.pi / 2 + rng.normal(0, 0.5, n)
-    side = np.stack([np.cos(turn), np.zeros(n), np.sin(turn)], 1)
+    angle = azimuth + np.pi / 2 + rng.normal(0, 0.5, n)
+    side = np.stack([np.cos(angle), np.zeros(n), np.sin(angle)], 1)
     side -= (side * direction).sum(1, keepdims=True) * direction
     length = height * rng.uniform(*species.length, n) * (1 - 0.3 * out * rng.uniform(0, 1, n))
     root = np.array([place[0], 0.0, place[1]]) + 0.018 * out[:, None] * outward
@@ -150,11 +150,11 @@ def spines(plants: Bed, motion: Sequence[Field], bend: float) -> np.ndarray:
     for k in range(1, SAMPLES):
         s = (k - 0.5) / (SAMPLES - 1)
         here = points[:, k - 1] + 0.5 * step * direction
-        wanted = plants.lean + bend * s * _felt(motion, here, s)
-        wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
+        target = plants.lean + bend * s * _felt(motion, here, s)
+        target /= np.linalg.norm(target, axis=1, keepdims=True)
         # stiffness for the number of points: a finer spine has the same shape
         keep = plants.stiffness[:, None] ** (24 / (SAMPLES - 1))
-        direction = keep * direction + (1 - keep) * wanted
+        direction = keep * direction + (1 - keep) * target
         direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
         direction = _above(direction, (floor[k] - points[:, k - 1, 1]) / step[:, 0])
         points[:, k] = points[:, k - 1] + step * direction
@@ -205,8 +205,8 @@ def ribbons(plants: Bed, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     s = np.linspace(0, 1, n)
     across = _carried_along(plants.side, tangent)
     face = np.cross(across, tangent)
-    turn = (plants.twist[:, None] * s)[..., None]
-    across, face = np.cos(turn) * across + np.sin(turn) * face, np.cos(turn) * face - np.sin(turn) * across
+    angle = (plants.twist[:, None] * s)[..., None]
+    across, face = np.cos(angle) * across + np.sin(angle) * face, np.cos(angle) * face - np.sin(angle) * across
 
     half = plants.half_width[:, None] * _outline(s, plants.belly[:, None])
     edge = np.abs(ACROSS)

@@ -63,9 +63,9 @@ def _shell(rng: np.random.Generator, count: int, dimensions: int) -> np.ndarray:
 
 def _clear(places: np.ndarray, points: np.ndarray, extent: np.ndarray, spacing: float) -> np.ndarray:
     """Which places (M,) bool have no point within the spacing, on the torus."""
-    apart = places[:, None] - points[None]
-    apart -= extent * np.rint(apart / extent)
-    return (apart * apart).sum(-1).min(1) >= spacing * spacing
+    offset = places[:, None] - points[None]
+    offset -= extent * np.rint(offset / extent)
+    return (offset * offset).sum(-1).min(1) >= spacing * spacing
 
 
 def _saturated(points: np.ndarray, extent: np.ndarray, spacing: float, rng: np.random.Generator) -> np.ndarray:
@@ -170,8 +170,8 @@ def _patches(inked: np.ndarray) -> tuple[np.ndarray, int]:
 
 def _middle(coordinates: np.ndarray, extent: np.ndarray) -> np.ndarray:
     """The mean (2,) of the coordinates (M, 2) of a patch on a torus."""
-    apart = coordinates - coordinates[0]
-    return (coordinates[0] + (apart - extent * np.rint(apart / extent)).mean(0)) % extent
+    offset = coordinates - coordinates[0]
+    return (coordinates[0] + (offset - extent * np.rint(offset / extent)).mean(0)) % extent
 
 
 def _kinds(colour: np.ndarray) -> np.ndarray:

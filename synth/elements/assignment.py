@@ -1,8 +1,8 @@
 """The assignment step (ma13 §4.1, Eqs. 6 and 7; §4.2, Eqs. 11 and 12): positions from the matches' predictions.
 
-Each neighbour s' of an output sample s is predicted by what the matches of s say: p(s') - p(s) = p̂(s', s). `solved`
+The matches of an output sample s predict the position of each neighbour s': p(s') - p(s) = p̂(s', s). `solved`
 minimizes Eq. 7 over all positions at once, a sparse positive definite system by conjugate gradients; `relaxed` is the
-parallel variant, in which the neighbours are taken as constants and each sample goes to the mean of what is said of it.
+parallel variant, in which neighbours are constants and each sample moves to the mean of its predicted positions.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ STAY = 1e-3  # weight that holds each sample where it is: makes the system defin
 
 @dataclass(frozen=True)
 class Predictions:
-    """Terms of Eq. 7: p(to) - p(of) = way, with weights; to, of (Q,) int; way (Q, D); weight (Q,)."""
+    """Terms of Eq. 7: p(to) - p(of) = offset, with weights; to, of (Q,) int; offset (Q, D); weight (Q,)."""
 
     to: np.ndarray
     of: np.ndarray
-    way: np.ndarray
+    offset: np.ndarray
     weight: np.ndarray
 
 
@@ -49,110 +49,111 @@ class Anchors:
 
     @staticmethod
     def all(parts: list[Anchors], dims: int) -> Anchors:
-        """All terms of several."""
+        """The terms of several anchors, concatenated."""
         parts = [Anchors.none(dims), *parts]
         return Anchors(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("sample", "target", "weight")))
 
 
-def match_weights(apart: np.ndarray) -> np.ndarray:
-    """ω_j (Eq. 12) of N matches at squared distances (M, N): 1 where there is one match alone."""
-    there = np.isfinite(apart)
-    distance = np.where(there, apart, 0.0).astype(np.float64)
+def match_weights(squared: np.ndarray) -> np.ndarray:
+    """ω_j (Eq. 12) of N matches at squared distances (M, N): 1 where there is only one match."""
+    there = np.isfinite(squared)
+    distance = np.where(there, squared, 0.0).astype(np.float64)
     total = distance.sum(axis=1, keepdims=True)
     several = there.sum(axis=1, keepdims=True) > 1
     weight = np.where(several & (total > 0), 1.0 - distance / np.where(total > 0, total, 1.0), 1.0)
     return np.where(there, weight, 0.0)
 
 
-def predictions(within: Exemplar, output: Output, coarse: np.ndarray | None, matches: Matches, active: np.ndarray,
+def predictions(exemplar: Exemplar, output: Output, coarse: np.ndarray | None, matches: Matches, active: np.ndarray,
                 ) -> Predictions:
-    """What the matches of the samples in the frames `active` say of their neighbours (Eqs. 6, 11).
+    """What the matches of the samples in the frames `active` predict for their neighbours (Eqs. 6, 11).
 
-    coarse (M, D): C, or of samples that a flow carries how far it has carried them; None: nothing
+    coarse (M, D): C, or for samples carried by a flow the distance carried; None: nothing is subtracted
     """
     dims, size = output.positions.shape[3], output.positions.shape[1] * output.positions.shape[2]
     samples = (active[:, None] * size + np.arange(size)).ravel()
     found = matches.sample[samples]
-    omega = match_weights(matches.apart[samples])
-    # in order, so that any number of threads says the same
+    omega = match_weights(matches.distance[samples])
+    # in order, so that the result does not depend on the number of threads
     with ThreadPoolExecutor(THREADS) as pool:
         terms = list(pool.map(
-            lambda part: _of_others(within, output, matches, samples[part], found[part], omega[part]),
+            lambda part: _of_others(exemplar, output, matches, samples[part], found[part], omega[part]),
             np.array_split(np.arange(len(samples)), THREADS)))
-        terms += pool.map(_of_tied(within, output, coarse, samples, found, omega), _near(within.offsets))
+        terms += pool.map(_of_tied(exemplar, output, coarse, samples, found, omega), _near(exemplar.offsets))
     return Predictions(np.concatenate([t.to for t in terms]), np.concatenate([t.of for t in terms]),
-                       np.concatenate([t.way for t in terms]).reshape(-1, dims),
+                       np.concatenate([t.offset for t in terms]).reshape(-1, dims),
                        np.concatenate([t.weight for t in terms]))
 
 
-def _of_others(within: Exemplar, output: Output, matches: Matches, samples: np.ndarray, found: np.ndarray,
+def _of_others(exemplar: Exemplar, output: Output, matches: Matches, samples: np.ndarray, found: np.ndarray,
                omega: np.ndarray) -> Predictions:
-    """Of the samples that the Hungarian algorithm has matched."""
-    shape = within.shape
+    """Predictions for the samples that the Hungarian algorithm has matched."""
+    shape = exemplar.shape
     neighbors, slots = matches.neighbors[samples], matches.slot[samples]
-    dims = within.other.shape[2]
+    dims = exemplar.other.shape[2]
     block = np.repeat(np.arange(len(shape.times)) * shape.most, shape.most)
-    way = np.zeros((*neighbors.shape, dims))
+    offset = np.zeros((*neighbors.shape, dims))
     total, falloff = np.zeros(neighbors.shape), np.zeros(neighbors.shape)
     for n in range(found.shape[1]):
         there = (slots[:, n] >= 0) & (neighbors >= 0) & (found[:, n, None] >= 0)
         row, column = np.nonzero(there)
         place = block[column] + slots[row, n, column]
         weight = omega[row, n]
-        way[row, column] += weight[:, None] * within.other[found[row, n], place]
-        falloff[row, column] += weight * within.falloff[found[row, n], place]
+        offset[row, column] += weight[:, None] * exemplar.other[found[row, n], place]
+        falloff[row, column] += weight * exemplar.falloff[found[row, n], place]
         total[row, column] += weight
     row, column = np.nonzero(total > 0)
-    said = way[row, column] / total[row, column][:, None]
-    if output.frames is not None:
-        said = np.einsum("nij,nj->ni", output.frames[samples[row]], said)
-    return _with_shift(output, samples[row], neighbors[row, column], said,
+    predicted = offset[row, column] / total[row, column][:, None]
+    if output.axes is not None:
+        predicted = np.einsum("nij,nj->ni", output.axes[samples[row]], predicted)
+    return _with_shift(output, samples[row], neighbors[row, column], predicted,
                        falloff[row, column] / total[row, column])
 
 
-def _with_shift(output: Output, of: np.ndarray, to: np.ndarray, way: np.ndarray, weight: np.ndarray) -> Predictions:
-    """Terms between samples whose shortest way leads over the border of a toroidal domain, in plain positions."""
+def _with_shift(output: Output, of: np.ndarray, to: np.ndarray, offset: np.ndarray, weight: np.ndarray) -> Predictions:
+    """The terms in positions that are not wrapped, for pairs that are nearest across the border of a toroidal
+    domain."""
     if output.period is not None:
         position = output.positions.reshape(-1, output.positions.shape[3])
         plain = position[to] - position[of]
         with np.errstate(divide="ignore", invalid="ignore"):
-            turns = np.where(output.period > 0, np.rint(plain / output.period), 0)
-        way = way + turns * output.period
-    return Predictions(to, of, way, weight)
+            periods = np.where(output.period > 0, np.rint(plain / output.period), 0)
+        offset = offset + periods * output.period
+    return Predictions(to, of, offset, weight)
 
 
-def _of_tied(within: Exemplar, output: Output, coarse: np.ndarray | None, samples: np.ndarray, found: np.ndarray,
+def _of_tied(exemplar: Exemplar, output: Output, coarse: np.ndarray | None, samples: np.ndarray, found: np.ndarray,
              omega: np.ndarray) -> Callable[[int], Predictions]:
-    """Of the samples tied by topology and time, those at the f-th offset.
+    """Predictions for the samples tied by topology or time, those at the f-th offset.
 
-    Of anchored details p̂ = C(s') + R(s') q(s_i') - C(s) - R(s) q(s_i): details turn with the coarse shape. Else the
-    way is turned as a whole.
+    With anchored details p̂ = C(s') + R(s') q(s_i') - C(s) - R(s) q(s_i): details rotate with the coarse shape.
+    Otherwise the offset is rotated as a whole.
     """
-    at = at_offsets(Elements(output.positions, within.elements.grid), within.offsets)[samples]
-    kappa = tied_weight(within)
+    at = at_offsets(Elements(output.positions, exemplar.elements.grid), exemplar.offsets)[samples]
+    kappa = tied_weight(exemplar)
 
     def of_offset(f: int) -> Predictions:
         to = at[:, f]
         row = np.nonzero((to >= 0) & (to < output.known * _size(output)))[0]
-        way, total = np.zeros((len(row), within.detail.shape[1])), np.zeros(len(row))
+        offset, total = np.zeros((len(row), exemplar.detail.shape[1])), np.zeros(len(row))
         for n in range(found.shape[1]):
             match = found[row, n]
-            weight = np.where((match >= 0) & (within.tie[match, f] > 0), omega[row, n], 0.0)
-            q, step = within.detail[match], within.tied[match, f]
-            if output.frames is not None:
-                here = output.frames[samples[row]]
-                if within.anchored:
-                    there = output.frames[to[row]]
-                    said = (np.einsum("nij,nj->ni", there, q + step) - np.einsum("nij,nj->ni", here, q))
+            weight = np.where((match >= 0) & (exemplar.tie[match, f] > 0), omega[row, n], 0.0)
+            q, step = exemplar.detail[match], exemplar.tied[match, f]
+            if output.axes is not None:
+                here = output.axes[samples[row]]
+                if exemplar.anchored:
+                    there = output.axes[to[row]]
+                    predicted = (np.einsum("nij,nj->ni", there, q + step) - np.einsum("nij,nj->ni", here, q))
                 else:
-                    said = np.einsum("nij,nj->ni", here, step)
+                    predicted = np.einsum("nij,nj->ni", here, step)
             else:
-                said = step
-            way += weight[:, None] * said
+                predicted = step
+            offset += weight[:, None] * predicted
             total += weight
         good = total > 0
         row = row[good]
-        away = way[good] / total[good][:, None]
+        away = offset[good] / total[good][:, None]
         if coarse is not None:
             away = away + coarse[to[row]] - coarse[samples[row]]
         return Predictions(to[row], samples[row], away, np.full(len(row), float(kappa[f])))
@@ -165,21 +166,21 @@ def _size(output: Output) -> int:
 
 
 def _near(offsets: np.ndarray) -> list[int]:
-    """The tied samples whose predictions are used: on a sheet those next to s, which carry what the farther ones say,
-    and all along a thread or in time."""
+    """The tied samples whose predictions are used: on a sheet those adjacent to s, which pass on the effect of farther
+    ones; along a thread and in time all."""
     return [f for f, (_, v, u) in enumerate(offsets) if v == 0 or max(abs(v), abs(u)) <= 1]
 
 
-def centred(within: Exemplar, output: Output, coarse: np.ndarray, matches: Matches, active: np.ndarray,
+def centred(exemplar: Exemplar, output: Output, coarse: np.ndarray, matches: Matches, active: np.ndarray,
             weight: float) -> Anchors:
-    """Anchored details where the matches themselves say that the sample lies: C(s) + R(s) q(s_i)."""
+    """Anchors of samples with anchored details, at the position that their own matches give: C(s) + R(s) q(s_i)."""
     size = _size(output)
     samples = (active[:, None] * size + np.arange(size)).ravel()
     samples = samples[matches.sample[samples, 0] >= 0]
-    omega = match_weights(matches.apart[samples])
-    q = np.sum(omega[..., None] * within.detail[matches.sample[samples]], axis=1) / omega.sum(axis=1)[:, None]
-    if output.frames is not None:
-        q = np.einsum("nij,nj->ni", output.frames[samples], q)
+    omega = match_weights(matches.distance[samples])
+    q = np.sum(omega[..., None] * exemplar.detail[matches.sample[samples]], axis=1) / omega.sum(axis=1)[:, None]
+    if output.axes is not None:
+        q = np.einsum("nij,nj->ni", output.axes[samples], q)
     return Anchors(samples, coarse[samples] + q, np.full(len(samples), weight))
 
 
@@ -204,8 +205,8 @@ def solved(positions: np.ndarray, terms: Predictions, anchors: Anchors, free: np
     matrix = diags(diagonal) - coupling - coupling.T
 
     def step(d: int) -> np.ndarray:
-        """Along one axis, from where the samples are: of what does not move it is then zero."""
-        residual = terms.way[:, d] - (base[terms.to, d] - base[terms.of, d])
+        """The change of the positions along one axis; zero where nothing moves."""
+        residual = terms.offset[:, d] - (base[terms.to, d] - base[terms.of, d])
         right = np.zeros(unknowns)
         for side, known, sign in sides:
             right += np.bincount(side[known], sign * weight[known] * residual[known], unknowns)
@@ -215,22 +216,23 @@ def solved(positions: np.ndarray, terms: Predictions, anchors: Anchors, free: np
         return found
 
     result = base.copy()
-    # sums of a BLAS depend on how many threads share them; the axes share nothing
+    # the sums of a BLAS depend on its number of threads; the axes are independent
     with threadpool_limits(1), ThreadPoolExecutor(dims) as pool:
         result[free] += np.stack(list(pool.map(step, range(dims))), axis=-1)
     return result
 
 
 def relaxed(positions: np.ndarray, terms: Predictions, anchors: Anchors, free: np.ndarray) -> np.ndarray:
-    """One parallel step: each free sample goes to the weighted mean of where its neighbours, as constants, and the
-    anchors say it is [Lefebvre and Hoppe 2005]."""
+    """One parallel step: each free sample moves to the weighted mean of the positions predicted by its neighbours, held
+    constant, and by the anchors [Lefebvre and Hoppe 2005]."""
     count, dims = positions.shape
     base = positions.astype(np.float64)
     total = np.full(count, STAY)
     where = STAY * base
-    said = ((terms.to, base[terms.of] + terms.way, terms.weight), (terms.of, base[terms.to] - terms.way, terms.weight),
-            (anchors.sample, anchors.target, anchors.weight))
-    for sample, target, weight in said:
+    predicted = ((terms.to, base[terms.of] + terms.offset, terms.weight),
+                 (terms.of, base[terms.to] - terms.offset, terms.weight),
+                 (anchors.sample, anchors.target, anchors.weight))
+    for sample, target, weight in predicted:
         total += np.bincount(sample, weight, count)
         for d in range(dims):
             where[:, d] += np.bincount(sample, weight * target[:, d], count)

@@ -1,8 +1,8 @@
 """Collisions between elements, the extra solver step of the hybrid (ma13 §4.1, figure 5).
 
-`resolved` pushes points apart, frame by frame. Threads that have passed through each other cannot be parted that way:
-one frame says to the left and the next to the right. `followed` moves them from frame to frame instead, in steps so
-small that none can pass.
+`resolved` pushes points apart, frame by frame. Threads that have passed through each other cannot be separated like
+that: one frame would push them to the left and the next to the right. `followed` moves them from frame to frame
+instead, in steps so small that none can pass through another.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from synth.elements.neighborhood import wrapped
 from synth.elements.search import difference
 
 ROUNDS = 20  # of pushing apart, at most
-SLACK = 0.02  # of the radii, by which elements are pushed farther apart than needed: else many would still touch
+SLACK = 0.02  # of the radii, by which elements are pushed farther apart than needed: otherwise many would still touch
 
 # threads
 BETWEEN = 5  # balls of a thread from one sample to the next
 FIRST_STEPS = 120  # from the coarse threads to the first frame
-STEP = 0.7  # radii that threads go in a step from frame to frame, nearly all of them at most
+STEP = 0.7  # radii by which the quantile NEARLY_ALL of samples moves in a step from frame to frame, at most
 NEARLY_ALL = 0.99
 FEWEST = 8  # steps from frame to frame
 SETTLE = 4  # rounds of pushing apart in a step
-BOLD = 1.3  # times the push that would do if nothing else pushed
+OVERSHOOT = 1.3  # times the push that would separate a pair if there were no other
 CLEARANCE = 0.06  # what SLACK is for points
 FIRST_PULL = 0.15  # radii in a step, towards the first frame
-PULL, FASTEST = 0.25, 0.2  # share of the way back that a step pulls a free sample, and the most, radii
-RIDING = 0.5  # share of the coarse motion in that of samples that touch
+PULL, FASTEST = 0.25, 0.2  # share of the distance by which a step pulls a free sample; the most, radii
+CARRIED = 0.5  # share of the coarse motion in that of samples that touch
 LISTED = 0.8  # radii: how much farther away than touching are the balls that a list of neighbours holds
 
 
@@ -49,7 +49,7 @@ def overlaps(points: np.ndarray, radius: np.ndarray, element: np.ndarray, period
 
 def _pushed(points: np.ndarray, one: np.ndarray, other: np.ndarray, depth: np.ndarray,
             period: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """The way by which each point (M, D) is pushed by its pairs, and how many these are (M,)."""
+    """The displacement (M, D) by which each point is pushed by its pairs, and how many pairs it has (M,)."""
     away = difference(points[other] - points[one], period).astype(np.float64)
     length = np.linalg.norm(away, axis=1, keepdims=True)
     along_x = np.eye(points.shape[1])[0]  # of two in one place
@@ -58,7 +58,7 @@ def _pushed(points: np.ndarray, one: np.ndarray, other: np.ndarray, depth: np.nd
     by = np.stack([np.bincount(other, push[:, d], len(points)) - np.bincount(one, push[:, d], len(points))
                    for d in range(points.shape[1])], axis=-1)
     hits = np.bincount(one, minlength=len(points)) + np.bincount(other, minlength=len(points))
-    # a mean over few pairs is too timid, a sum over many too bold
+    # the mean push converges slowly with few pairs, the sum overshoots with many
     return by / np.maximum(1.0, hits / 2)[:, None], hits
 
 
@@ -66,7 +66,7 @@ def resolved(points: np.ndarray, radius: np.ndarray, element: np.ndarray, period
              ) -> np.ndarray:
     """The points (M, D) pushed apart until no two elements interpenetrate, or ROUNDS are over.
 
-    All pairs of a round push at once; a sample goes by the mean of what its pairs ask.
+    All pairs of a round push at once; a sample moves by about the mean of the pushes of its pairs.
     """
     result = points.astype(np.float64)
     for _ in range(ROUNDS):
@@ -77,31 +77,31 @@ def resolved(points: np.ndarray, radius: np.ndarray, element: np.ndarray, period
     return result
 
 
-def followed(coarse: np.ndarray, wanted: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Threads that go where `wanted` says without passing through each other: (T, E, S, D) float64.
+def followed(coarse: np.ndarray, target: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Threads that follow `target` without passing through each other: (T, E, S, D) float64.
 
-    coarse  (T, E, S, D): threads side by side, which do not interpenetrate; wanted (T, E, S, D); radius (E,)
+    coarse  (T, E, S, D): threads side by side, which do not interpenetrate; target (T, E, S, D); radius (E,)
     The first frame grows out of the coarse threads, and each frame out of the one before: position-based dynamics
     [Müller et al. 2007], whose constraints are contacts and the lengths of segments, those of the coarse threads.
     What touches moves partly as the coarse threads do, which keep their places in the bundle; what is free is pulled
-    to where it is wanted, so that it comes back after a contact.
+    to its target, so that it comes back after a contact.
     """
-    frames = len(wanted)
-    coarse, wanted = coarse.astype(np.float64), wanted.astype(np.float64)
+    frames = len(target)
+    coarse, target = coarse.astype(np.float64), target.astype(np.float64)
     threads = _Threads(coarse[0], radius, np.linalg.norm(np.diff(coarse, axis=2), axis=-1, keepdims=True).mean(axis=0))
     for step in range(1, FIRST_STEPS + 1):
-        threads.pulled(coarse[0] + (wanted[0] - coarse[0]) * step / FIRST_STEPS, 1.0, FIRST_PULL)
+        threads.pulled(coarse[0] + (target[0] - coarse[0]) * step / FIRST_STEPS, 1.0, FIRST_PULL)
         threads.settle()
-    result = np.empty_like(wanted)
+    result = np.empty_like(target)
     result[0] = threads.positions
     for t in range(1, frames):
-        there, bundle = wanted[t] - wanted[t - 1], coarse[t] - coarse[t - 1]
-        way = float(np.quantile(np.linalg.norm(there, axis=-1), NEARLY_ALL))
-        steps = max(FEWEST, int(np.ceil(way / (STEP * threads.thick))))
+        there, bundle = target[t] - target[t - 1], coarse[t] - coarse[t - 1]
+        furthest = float(np.quantile(np.linalg.norm(there, axis=-1), NEARLY_ALL))
+        steps = max(FEWEST, int(np.ceil(furthest / (STEP * threads.thick))))
         there, bundle = there / steps, bundle / steps
         for step in range(1, steps + 1):
-            threads.positions += np.where(threads.touching, RIDING * bundle + (1 - RIDING) * there, there)
-            threads.pulled(wanted[t - 1] + step * there, PULL, FASTEST)
+            threads.positions += np.where(threads.touching, CARRIED * bundle + (1 - CARRIED) * there, there)
+            threads.pulled(target[t - 1] + step * there, PULL, FASTEST)
             threads.settle()
         result[t] = threads.positions
     return result
@@ -140,10 +140,10 @@ class _Threads:
         self.listed: np.ndarray | None = None  # where the balls were when `pairs` was made
 
     def pulled(self, target: np.ndarray, share: float, most: float) -> None:
-        """Move free samples to `target` by a share of the way, at most by `most` radii."""
-        way = np.where(self.touching, 0.0, target - self.positions)
-        length = np.linalg.norm(way, axis=-1, keepdims=True)
-        self.positions += way * np.minimum(share, most * self.thick / np.maximum(length, 1e-12))
+        """Move free samples towards `target` by a share of the distance, at most by `most` radii."""
+        offset = np.where(self.touching, 0.0, target - self.positions)
+        length = np.linalg.norm(offset, axis=-1, keepdims=True)
+        self.positions += offset * np.minimum(share, most * self.thick / np.maximum(length, 1e-12))
 
     def settle(self) -> None:
         """Bring segments back to their lengths and push threads apart."""
@@ -158,7 +158,7 @@ class _Threads:
                 break
 
     def _push_apart(self) -> bool:
-        """One round: what balls are pushed by goes to the samples on both sides. Whether any touch."""
+        """One round: the push on each ball is shared by the samples on both sides. Returns whether any touch."""
         count, samples, dims = self.positions.shape
         share = (np.arange(BETWEEN) / BETWEEN)[:, None]
         balls = _balls(self.positions)
@@ -168,7 +168,7 @@ class _Threads:
         deep = depth > 0
         given, weight = np.zeros_like(self.positions), np.zeros((count, samples, 1))
         if deep.any():
-            by, hits = _pushed(balls, one[deep], other[deep], BOLD * depth[deep])
+            by, hits = _pushed(balls, one[deep], other[deep], OVERSHOOT * depth[deep])
             by = by.reshape(count, samples - 1, BETWEEN, dims)
             hit = (hits > 0).reshape(count, samples - 1, BETWEEN, 1)
             for at, part in ((slice(0, -1), 1 - share), (slice(1, None), share)):

@@ -16,7 +16,7 @@ def coarse(positions: np.ndarray, grid: tuple[int, ...], frames: int, along: int
     """C: samples (T, E, S, D) low-passed over `frames` on each side in time and `along` samples on each side along
     the element, the same shape, float32.
 
-    Each filter is a mean over a window that shrinks towards the ends, so that it stays symmetric and biases nothing.
+    Each filter is a mean over a window that shrinks towards the ends, so that it stays symmetric and adds no bias.
     """
     shape = positions.shape
     lines = positions.astype(np.float64).reshape(*shape[:2], *(grid or (1,)), shape[3])
@@ -44,15 +44,15 @@ def with_coarse(elements: Elements) -> Elements:
 
 
 def following(threads: Elements, frames: int, along: int) -> Elements:
-    """A bundle whose C follows what its threads do together, so that their details hold only what is each one's own.
+    """A bundle whose C is the motion common to its threads, so that details hold only what differs.
 
-    threads   with a C whose first samples say how they lie beside each other in the bundle's section, x and y
+    threads   with a C whose first samples are their places in the section of the bundle, x and y
     frames, along   reach of the filter on the mean thread, as for `coarse`
     """
     if threads.coarse is None or threads.topology != "thread":
-        raise ValueError("only threads that lie beside each other in a bundle have a motion that they share")
+        raise ValueError("only threads side by side in a bundle have a common motion")
     middle = coarse(threads.positions.mean(axis=1, keepdims=True), threads.grid, frames, along).astype(np.float64)
     beside = threads.coarse[0, :, 0] - threads.coarse[0, :, 0].mean(axis=0)
-    turn = along_threads(middle).reshape(*middle.shape[:1], *threads.grid, 3, 3)
-    shared = middle + np.einsum("tsij,ej->tesi", turn, beside.astype(np.float64))
+    axes = along_threads(middle).reshape(*middle.shape[:1], *threads.grid, 3, 3)
+    shared = middle + np.einsum("tsij,ej->tesi", axes, beside.astype(np.float64))
     return replace(threads, coarse=shared)

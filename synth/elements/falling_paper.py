@@ -11,26 +11,26 @@ from scipy.spatial import cKDTree
 from synth.elements.samples import Elements
 
 STEPS = 4  # in a frame of 24 per second
-REACH = 1.15  # how far scraps keep from one another, in their widths
-RESPONSE = 0.22  # seconds in which a scrap goes with the wind
+REACH = 1.15  # distance that scraps keep from one another, in their widths
+RESPONSE = 0.22  # seconds in which a scrap takes on the wind's velocity
 FALL = 1.6  # widths per second that a scrap sinks in still air
 PUSH = 30.0  # widths per s²: of two scraps in one place
-RISE, WHIRL = 9.0, 11.0  # widths per second of the gust, upwards and round
+RISE, WHIRL = 9.0, 11.0  # widths per second of the gust, upwards and around
 GUSTY = 2.0  # of its eddies, rms
 TUMBLE = 2.4  # radians per second about each axis in the gust, rms
-LULL = 0.9  # shares of the clip when the gust is over
+LULL = 0.9  # share of the clip after which the gust is over
 
 
 def tossed(count: int = 300, frames: int = 60, *, side: int = 7, spacing: float = 1.0, thickness: float = 0.02,
            rate: float = 24.0, seed: int = 0) -> Elements:
-    """A loose heap of scraps that a whirl of wind lifts, turns round and lets sink again.
+    """A loose heap of scraps that a whirlwind lifts, carries round and lets sink again.
 
     count      scraps, 1 to 5000; they lie in a round heap on y = 0, y up, its axis x = z = 0
     side       samples in a row and in a column of a scrap; spacing of them, and thickness, world units
-    Scraps follow the wind with a lag, yield to one another and to the ground, and tumble, the more the harder it
-    blows. The wind is a column that turns and rises, as wide as the heap, with eddies; it comes up smoothly and dies.
-    Positions are those of flat sheets, row by row, and are their own `coarse`; colours are of paper.
-    Raises ValueError for numbers out of these ranges.
+    Scraps follow the wind with a lag, are pushed away from one another and from the ground, and tumble, more in
+    stronger wind. The wind is a rising, rotating column, as wide as the heap, with eddies; it starts and ends
+    smoothly. Positions are those of flat sheets, row by row, and are their own `coarse`; colours are of paper. Raises
+    ValueError for numbers out of these ranges.
     """
     if not 1 <= count <= 5000 or frames < 2 or side < 2:
         raise ValueError("1 to 5000 scraps of 2 × 2 samples or more are tossed over 2 frames or more, not "
@@ -39,11 +39,11 @@ def tossed(count: int = 300, frames: int = 60, *, side: int = 7, spacing: float 
         raise ValueError(f"spacing, thickness and rate are above 0, not {spacing}, {thickness} and {rate}")
     rng = np.random.Generator(np.random.Philox(key=seed))
     width = spacing * (side - 1)
-    centre, turn = _flight(count, frames, rate, rng)
+    centre, axes = _flight(count, frames, rate, rng)
     along = (np.arange(side) - (side - 1) / 2) * spacing
     x, y = (axis.ravel() for axis in np.meshgrid(along, along))
     flat = np.stack([x, y, np.zeros_like(x)], -1)
-    positions = (centre[:, :, None] * width + np.einsum("sk,teck->tesc", flat, turn)).astype(np.float32)
+    positions = (centre[:, :, None] * width + np.einsum("sk,teck->tesc", flat, axes)).astype(np.float32)
     tint = np.array([[0.95, 0.93, 0.87], [0.93, 0.93, 0.93], [0.88, 0.91, 0.95], [0.96, 0.88, 0.80]])
     colour = tint[rng.integers(len(tint), size=count)] * np.exp(rng.normal(0, 0.03, (count, 1)))
     return Elements(positions, (side, side), rate, size=np.full(count, thickness), colour=colour.clip(0, 1),
@@ -51,34 +51,34 @@ def tossed(count: int = 300, frames: int = 60, *, side: int = 7, spacing: float 
 
 
 def _flight(count: int, frames: int, rate: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (frames, E, 3), widths, and rotations (frames, E, 3, 3) of the scraps: their axes are the columns."""
+    """Centres (frames, E, 3), widths, and axes (frames, E, 3, 3) of the scraps, as columns."""
     place = _heap(count, rng)
     broad = np.linalg.norm(place[:, [0, 2]], axis=1).max() + 1
     velocity = np.zeros_like(place)
-    turn = _flat_or_so(count, rng)
+    rotation = _flat_or_so(count, rng)
     pace, phase = 2 * np.pi * rng.uniform(0.2, 0.7, (2, count, 3)), rng.uniform(0, 2 * np.pi, (2, count, 3))
     eddies = _eddies(rng, broad)
     steps = max(1, int(np.ceil(STEPS * 24 / rate)))
     step, last = 1 / (rate * steps), (frames - 1) / rate
-    centres, turns = np.empty((frames, count, 3)), np.empty((frames, count, 3, 3))
+    centres, axes = np.empty((frames, count, 3)), np.empty((frames, count, 3, 3))
     for k in range((frames - 1) * steps + 1):
         if k % steps == 0:
-            centres[k // steps], turns[k // steps] = place, _matrices(turn)
+            centres[k // steps], axes[k // steps] = place, _matrices(rotation)
         time = k * step
         begun = _smooth(time / min(0.6, last))  # the heap lies as it is until then
         blows = begun * (1 - _smooth((time / last - 0.45) / (LULL - 0.45)))
         wind = blows * (_column(place, broad) + eddies(place, time))
         wind[:, 1] -= FALL * begun
-        push = begun * _apart(place)
+        push = begun * _repulsion(place)
         push[:, 1] += begun * PUSH * np.clip(0.7 - place[:, 1], 0, None) / 0.7
         velocity += step * ((wind - velocity) / RESPONSE + push)
         place = place + step * velocity
-        # in the air a scrap tumbles as it will; near the ground it settles down
+        # in the air a scrap tumbles freely; near the ground it settles
         aloft = _smooth((place[:, 1] - 0.4) / 1.5)[:, None] * (0.25 + 0.75 * blows)
         spin = TUMBLE * aloft * np.sin(pace * time + phase).sum(0)
         spin[:, 1] -= blows * aloft[:, 0] * WHIRL / broad
-        turn = _turned(turn, spin * step)
-    return centres, turns
+        rotation = _rotated(rotation, spin * step)
+    return centres, axes
 
 
 def _smooth(share: np.ndarray | float) -> np.ndarray:
@@ -99,14 +99,14 @@ def _heap(count: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def _flat_or_so(count: int, rng: np.random.Generator) -> np.ndarray:
-    """Rotations (E, 4), as quaternions, of scraps that lie about: normals within some 25 degrees of up."""
+    """Rotations (E, 4), as quaternions, of scraps that lie on the heap: normals within some 25 degrees of up."""
     upright = _quaternions(np.tile([-np.pi / 2, 0.0, 0.0], (count, 1)))  # from +z to +y
     spun = _quaternions(np.stack([np.zeros(count), rng.uniform(0, 2 * np.pi, count), np.zeros(count)], 1))
     return _product(_quaternions(rng.normal(0, 0.25, (count, 3)) * [1, 0, 1]), _product(spun, upright))
 
 
 def _column(place: np.ndarray, broad: float) -> np.ndarray:
-    """The gust (E, 3), widths per second: it rises in the middle, turns round it, and draws in below."""
+    """The gust (E, 3), widths per second: it rises in the middle, rotates around it, and flows in below."""
     r = np.linalg.norm(place[:, [0, 2]], axis=1, keepdims=True) / broad
     core = np.exp(-1.2 * r * r)
     out = place[:, [0, 2]] / broad
@@ -127,7 +127,7 @@ def _eddies(rng: np.random.Generator, broad: float) -> Callable[[np.ndarray, flo
     return lambda place, time: np.sin(place @ wave.T - pace * time + phase) @ across
 
 
-def _apart(place: np.ndarray) -> np.ndarray:
+def _repulsion(place: np.ndarray) -> np.ndarray:
     """Accelerations (E, 3) of scraps away from those that are near."""
     pairs = cKDTree(place).query_pairs(REACH, output_type="ndarray")
     pairs = pairs[np.lexsort(pairs.T)]  # one order of the sums
@@ -140,10 +140,10 @@ def _apart(place: np.ndarray) -> np.ndarray:
     return push
 
 
-def _quaternions(turned: np.ndarray) -> np.ndarray:
+def _quaternions(vectors: np.ndarray) -> np.ndarray:
     """Quaternions (E, 4), scalar first, of rotation vectors (E, 3)."""
-    angle = np.linalg.norm(turned, axis=1, keepdims=True)
-    return np.concatenate([np.cos(angle / 2), np.sinc(angle / (2 * np.pi)) / 2 * turned], 1)
+    angle = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.concatenate([np.cos(angle / 2), np.sinc(angle / (2 * np.pi)) / 2 * vectors], 1)
 
 
 def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -152,15 +152,15 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
                            a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:] + np.cross(a[:, 1:], b[:, 1:])], 1)
 
 
-def _turned(turn: np.ndarray, by: np.ndarray) -> np.ndarray:
-    """Quaternions (E, 4) turned on by rotation vectors (E, 3), world axes."""
-    turn = _product(_quaternions(by), turn)
-    return turn / np.linalg.norm(turn, axis=1, keepdims=True)
+def _rotated(rotation: np.ndarray, by: np.ndarray) -> np.ndarray:
+    """Quaternions (E, 4) rotated by rotation vectors (E, 3), world axes."""
+    rotation = _product(_quaternions(by), rotation)
+    return rotation / np.linalg.norm(rotation, axis=1, keepdims=True)
 
 
-def _matrices(turn: np.ndarray) -> np.ndarray:
+def _matrices(rotation: np.ndarray) -> np.ndarray:
     """Rotation matrices (E, 3, 3) of quaternions (E, 4)."""
-    w, x, y, z = turn.T
+    w, x, y, z = rotation.T
     return np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
                      2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
                      2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1).reshape(-1, 3, 3)

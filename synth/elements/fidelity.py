@@ -17,14 +17,14 @@ from synth.elements.neighborhood import wrapped
 BINS = 24  # of the pair correlation, up to REACH
 REACH = 3.0  # nearest distances
 SMOOTH = 0.75  # bins, by which it is smoothed: small exemplars have few pairs
-FRAMES = 12  # of an animation that are looked at, at most
+FRAMES = 12  # of an animation that are measured, at most
 
 
 @dataclass(frozen=True)
 class Statistics:
     """What is compared.
 
-    correlation  (BINS,) g at radii up to REACH nearest distances: 1 where elements know nothing of each other
+    correlation  (BINS,) g at radii up to REACH nearest distances: 1 where elements are independent of each other
     spectrum     power of the velocity by frequency, (T // 2,); empty of what does not move
     nearest      mean distance to the nearest element
     """
@@ -41,8 +41,8 @@ def statistics(positions: np.ndarray, spacing: float, period: np.ndarray | None 
 
     spacing  the exemplar's nearest distance, by which radii are measured
     period   (D,) of what repeats, 0 along axes that end
-    depth    of points (M, D) in their domain; those nearer to its border than REACH are not asked for their
-             neighbours, so that the border does not count as emptiness. None: all are
+    depth    of points (M, D) in their domain; those nearer to its border than REACH are left out,
+             so that the border does not count as empty space. None: all are used
     carried  like positions: how far a global flow has carried each, which is not its own motion
     """
     points = positions.mean(axis=2).astype(np.float64)
@@ -57,23 +57,24 @@ def statistics(positions: np.ndarray, spacing: float, period: np.ndarray | None 
         distance = tree.query(now[inner], k=2)[0][:, 1]
         nearest.append(distance)
         pairs = tree.sparse_distance_matrix(cKDTree(now[inner]), reach, output_type="coo_matrix")
-        apart = pairs.data[pairs.data > 0]
-        counts += np.histogram(apart, bins=BINS, range=(0, reach))[0]
-        density.append(len(apart) / len(inner))
+        distances = pairs.data[pairs.data > 0]
+        counts += np.histogram(distances, bins=BINS, range=(0, reach))[0]
+        density.append(len(distances) / len(inner))
         asked += len(inner)
     if not asked:
-        raise ValueError("no element lies deep enough in the domain to be looked at")
+        raise ValueError("no element lies deep enough in the domain to be measured")
     edges = np.linspace(0, reach, BINS + 1)
     counts = ndimage.gaussian_filter1d(counts, SMOOTH, mode="nearest")
     shell = np.diff(edges ** points.shape[2])
-    # normed by how many there are within REACH: the density is asked for apart
+    # normalized by the number within REACH: density is compared separately
     correlation = counts / asked / shell * reach ** points.shape[2] / max(float(np.mean(density)), 1e-9)
     return Statistics(correlation, spectrum(positions if carried is None else positions - carried),
                       float(np.mean(np.concatenate(nearest))))
 
 
 def _repeated(points: np.ndarray, period: np.ndarray | None, reach: float) -> np.ndarray:
-    """The points (M, D) of the one unit, and their copies all round as far as `reach`, which may be many units."""
+    """The points (M, D) of one period, and their copies in all directions as far as `reach`, which may be many
+    periods."""
     for axis in np.flatnonzero(period) if period is not None else ():
         unit = float(period[axis])  # type: ignore[index]
         many = int(np.ceil(reach / unit))
@@ -94,9 +95,9 @@ def spectrum(positions: np.ndarray) -> np.ndarray:
 
 
 def difference(one: np.ndarray, other: np.ndarray) -> float:
-    """How far two functions are apart: the mean absolute difference over the mean of the first; 0 for empty ones.
+    """The difference of two functions: the mean absolute difference over the mean of the first; 0 for empty ones.
 
-    Of two lengths the shorter counts, both being spectra of the same frequencies from 0 on after resampling.
+    Functions of different lengths are compared at the length of the first: both are spectra over the same frequencies.
     """
     if not len(one) or not len(other):
         return 0.0

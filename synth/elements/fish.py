@@ -219,24 +219,24 @@ def _fins(detail: int) -> list[_Template]:
             *(_paired(0.43, -0.085, side, (0.070, -0.040, 0.018), detail) for side in (1, -1))]
 
 
-def _median(start: float, end: float, profile: np.ndarray, way: int, height: float, sweep: float,
+def _median(start: float, end: float, profile: np.ndarray, sign: int, height: float, sweep: float,
             detail: int) -> _Template:
-    """A fin that stands on the back (way 1) or hangs from the belly (-1), swept back, high in front."""
+    """A fin that stands on the back (sign 1) or hangs from the belly (-1), swept back, high in front."""
     share = np.linspace(0, 1, 4 * detail + 1)
     s = start + share * (end - start)
     foot = _outline(profile, s)
     rise = height * np.minimum(1, share / 0.2) ** 0.7 * (1 - 0.78 * _step(0.15, 1.0, share))
     zero = np.zeros_like(s)
-    return _fin(np.stack([s, way * (foot - 0.012), zero], 1),
-                np.stack([s + sweep * np.minimum(1, share / 0.2), way * (foot + rise), zero], 1), detail)
+    return _fin(np.stack([s, sign * (foot - 0.012), zero], 1),
+                np.stack([s + sweep * np.minimum(1, share / 0.2), sign * (foot + rise), zero], 1), detail)
 
 
-def _paired(s: float, y: float, side: int, way: tuple[float, float, float], detail: int) -> _Template:
-    """A fin beside the body that points back, down and out by `way`."""
+def _paired(s: float, y: float, side: int, reach: tuple[float, float, float], detail: int) -> _Template:
+    """A fin beside the body that points back, down and out by `reach`."""
     half = _half_width(s, y)
     share = np.linspace(0, 1, 2 * detail + 1)
     root = np.stack([s + 0.01 * share, y - 0.030 * share, np.full_like(share, side * (half - 0.006))], 1)
-    tip = root + np.array([way[0], way[1], side * way[2]]) * (1 - 0.45 * share**1.5)[:, None]
+    tip = root + np.array([reach[0], reach[1], side * reach[2]]) * (1 - 0.45 * share**1.5)[:, None]
     return _fin(root, tip, detail)
 
 

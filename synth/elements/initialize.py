@@ -1,11 +1,12 @@
-"""The first guess of an output (ma13 §4.1, Initialization): patches of the exemplar, of whole elements over all
-frames, copied into the domain, from the most to the least constrained region.
+"""The initial output (ma13 §4.1, Initialization): patches of the exemplar, of whole elements over all frames, copied
+into the domain, from the most to the least constrained region.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -14,18 +15,18 @@ from synth.elements.constraints import Domain
 from synth.elements.neighborhood import wrapped
 from synth.elements.samples import Elements
 
-TRIES = 24  # patches that are looked at for each place
-GO_ON = 4  # of the nearest patches before it, which it may go on
-CONTINUE = 0.02  # misfit by which chance must fit worse for that: a copy of the whole exemplar is no new arrangement
-SAME = 0.15  # of the spacing: nearer than that, two elements are one and the same
-CLOSE = 0.6  # of the spacing: nearer than that, an element of a patch is left out
-FILL_TRIES = 40  # points tried, for each element that is missing
-JUMP_WITHIN = 0.6  # of the exemplar's frames: a track that has come to its end goes on before this
+TRIES = 24  # random patches compared for each place
+GO_ON = 4  # nearest patches before it that a patch may continue
+CONTINUE = 0.02  # handicap of a continuation: copying the whole exemplar gives no new arrangement
+SAME = 0.15  # of the spacing: two elements nearer than this count as the same
+CLOSE = 0.6  # of the spacing: an element of a patch nearer than this to another is left out
+FILL_TRIES = 40  # points tried for each missing element
+JUMP_BEFORE = 0.6  # share of the exemplar's frames before which a track that has reached the end continues
 
 
 @dataclass(frozen=True)
 class Copied:
-    """An output as it begins.
+    """An initial output.
 
     elements  T frames
     source    (T·E·S,) int32: the exemplar sample that each sample was copied from
@@ -41,32 +42,38 @@ def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spaci
            mismatch: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None, count: int | None = None) -> Copied:
     """Elements of one sample each, in a domain.
 
+    1. Place an element at each hard position.
+    2. For each place, the most constrained first: copy the best patch of the exemplar, without elements that lie
+       outside the domain, are of a kind not allowed there, or are too close to elements placed before.
+    3. Remove the most crowded elements or fill the widest gaps until the count is right.
+    4. Continue each element over all frames as the one that it was copied from.
+
     radius    of the neighbourhood, the size of a patch; spacing: the exemplar's nearest distance, world units
-    rotation  local frames (M, D, D) at points (M, D) of the first frame
+    rotation  local axes (M, D, D) at points (M, D) of the first frame
     pins      (P, D) hard positions in the first frame
-    allowed   bits of the kinds that may stand at points (M, D)
-    mismatch  how little exemplar elements (M,) suit points (M, D), from 0 to 1: a control map's difference
+    allowed   bits of the kinds allowed at points (M, D)
+    mismatch  of exemplar elements (M,) at points (M, D), from 0 to 1: the difference of a control map
     count     of the elements; None: as dense as the exemplar
     Raises ValueError for a domain smaller than a neighbourhood, or more pins than elements.
     """
     rng = np.random.Generator(np.random.Philox(key=seed))
     dims = exemplar.dimensions
-    start = exemplar.positions[0, :, 0]
-    toroidal = exemplar.box is not None
-    box = _box(exemplar, spacing)
+    patches = _Patches(exemplar.positions[0, :, 0], _box(exemplar, spacing), exemplar.box is not None, radius, spacing,
+                       domain, rotation, mismatch)
     volume = float((domain.inside > 0).sum()) * domain.cell**dims
     expected = count or as_dense(exemplar, domain, spacing)
     if volume < radius**dims:
         raise ValueError("the domain is smaller than a neighbourhood")
+    # 1. hard positions
     placed = np.zeros((0, dims)) if pins is None else pins.astype(np.float64)
     if len(placed) > expected:
         raise ValueError(f"{len(placed)} hard positions are more than the {expected} elements the domain holds")
     source = rng.integers(0, exemplar.count, len(placed))
-    cut: list[Cut] = []
+    # 2. patches
+    cuts: list[Cut] = []
     for centre in _places(domain, radius, placed):
-        patch, elements, taken = _patch(start, box, toroidal, centre, radius, rng, placed, domain, rotation, spacing,
-                                        cut, mismatch)
-        cut.append(taken)
+        patch, elements, cut = patches.best(centre, placed, cuts, rng)
+        cuts.append(cut)
         good = domain.distance(patch) > 0 if len(patch) else np.zeros(0, bool)
         patch = domain.wrapped(patch)
         if allowed is not None and len(patch):
@@ -76,8 +83,10 @@ def points(exemplar: Elements, domain: Domain, frames: int, radius: float, spaci
             far = _tree(domain, placed).query(_unit(domain, patch))[0] > CLOSE * spacing
             patch, elements = patch[far], elements[far]
         placed, source = np.vstack([placed, patch]), np.concatenate([source, elements])
+    # 3. count
     placed, source = _counted(placed, source, expected, 0 if pins is None else len(pins), domain, exemplar, allowed,
                               rng)
+    # 4. time
     return _over_time(exemplar, placed, source, frames, rotation)
 
 
@@ -89,8 +98,8 @@ def as_dense(exemplar: Elements, domain: Domain, spacing: float) -> int:
 
 
 def _box(exemplar: Elements, spacing: float) -> np.ndarray:
-    """What the exemplar fills in its first frame, (2, D): its unit, or what is round its elements, a spacing or more
-    along each axis (one that is flat is a layer)."""
+    """The box that the exemplar fills in its first frame, (2, D): its own, or the bounds of its elements, at least one
+    spacing along each axis (a flat exemplar is one layer)."""
     if exemplar.box is not None:
         return exemplar.box
     start = exemplar.positions[0, :, 0]
@@ -117,7 +126,7 @@ def _places(domain: Domain, radius: float, pins: np.ndarray) -> np.ndarray:
 
 
 def _unit(domain: Domain, points: np.ndarray) -> np.ndarray:
-    """Points from the domain's lower corner on, in its one unit where it repeats: as SciPy's trees take them."""
+    """Points relative to the domain's lower corner, wrapped where it repeats: as SciPy's trees take them."""
     return wrapped(points - (domain.origin - domain.cell / 2), domain.period)
 
 
@@ -125,56 +134,103 @@ def _tree(domain: Domain, points: np.ndarray) -> cKDTree:
     return cKDTree(_unit(domain, points), boxsize=domain.period)
 
 
-Cut = tuple[np.ndarray, np.ndarray]
-"""Where a patch was put, and the place in the exemplar that it was cut from."""
+class Cut(NamedTuple):
+    """Where a patch was placed, and the place in the exemplar that it was cut from, (D,) each."""
+
+    placed_at: np.ndarray
+    cut_from: np.ndarray
 
 
-def _patch(start: np.ndarray, box: np.ndarray, toroidal: bool, centre: np.ndarray, radius: float,
-           rng: np.random.Generator, placed: np.ndarray, domain: Domain,
-           rotation: Callable[[np.ndarray], np.ndarray] | None, spacing: float, cut: list[Cut],
-           mismatch: Callable[[np.ndarray, np.ndarray], np.ndarray] | None) -> tuple[np.ndarray, np.ndarray, Cut]:
-    """The patch of the exemplar that fits best at `centre`: least crowded against what is placed, and with the fewest
-    elements out of the domain. Of TRIES at random, and of those that go on where the nearest patches before it end,
-    which are taken where chance fits worse by CONTINUE. Positions (K, D), which elements they are, and its cut."""
-    frame = np.eye(len(centre)) if rotation is None else rotation(centre[None])[0].astype(np.float64)
-    tree = _tree(domain, placed) if len(placed) else None
-    period = box[1] - box[0]
-    room = period / 2 if toroidal else np.maximum(0, period / 2 - radius)
-    tries = [(rng.uniform(-room, room) + (box[0] + box[1]) / 2, 0.0) for _ in range(TRIES)]
-    nearest = sorted(cut, key=lambda c: float(np.sum((c[0] - centre) ** 2)))[:GO_ON]
-    going_on = [middle + frame.T @ (centre - other) for other, middle in nearest]
-    tries += [(middle, CONTINUE) for middle in going_on
-              if toroidal or ((middle > box[0]) & (middle < box[1])).all()]
-    best, least = (np.zeros((0, len(centre))), np.zeros(0, int), (centre, tries[0][0])), np.inf
-    # a patch may be wider than the exemplar: it then holds elements more than once
-    steps = np.stack(np.meshgrid(*[(-1, 0, 1)] * len(centre), indexing="ij"), axis=-1).reshape(-1, len(centre))
-    copies = (start + period * steps[:, None]).reshape(-1, len(centre)) if toroidal else start
-    for middle, misfit in tries:
-        at = box[0] + np.mod(middle - box[0], period) if toroidal else middle
-        away = (copies - at) @ frame.T
-        inside = (np.abs(away) <= radius).all(axis=1)
-        patch = centre + away[inside]
-        if len(patch):
-            out = domain.distance(patch) < 0
-            if mismatch is not None:
-                misfit += float(mismatch(patch, np.nonzero(inside)[0] % len(start)).mean())
-            if not toroidal:  # an exemplar that ends has borders to put on the domain's
-                misfit += float(out.mean())
-            if tree is not None and not out.all():
-                distance = tree.query(_unit(domain, patch[~out]))[0]
-                crowded = np.where(distance < SAME * spacing, 0.0, np.maximum(0, 1 - distance / spacing))
-                misfit += float(np.sum(crowded**2)) / len(patch) * 2
-        else:
-            misfit += 10.0
-        if misfit < least:
-            least, best = misfit, (patch, np.nonzero(inside)[0] % len(start), (centre, middle))
-    return best
+@dataclass(frozen=True)
+class _Patches:
+    """Patches of an exemplar, and how well they fit into a domain.
+
+    start     (E, D) the exemplar's positions in its first frame
+    box       (2, D) that they fill; toroidal: whether they repeat there
+    radius    half the width of a patch; spacing: the exemplar's nearest distance, world units
+    rotation, mismatch   as for `points`
+    """
+
+    start: np.ndarray
+    box: np.ndarray
+    toroidal: bool
+    radius: float
+    spacing: float
+    domain: Domain
+    rotation: Callable[[np.ndarray], np.ndarray] | None
+    mismatch: Callable[[np.ndarray, np.ndarray], np.ndarray] | None
+
+    def best(self, centre: np.ndarray, placed: np.ndarray, cuts: list[Cut], rng: np.random.Generator,
+             ) -> tuple[np.ndarray, np.ndarray, Cut]:
+        """The patch that fits best at `centre` (D,) beside the positions `placed` (P, D), after the patches `cuts`.
+
+        1. Propose TRIES places in the exemplar at random, and those that continue the GO_ON nearest patches before.
+        2. Cut a patch at each, rotated by the local axes at the centre.
+        3. Take the one with the least misfit; a continuation is handicapped by CONTINUE.
+        Returns positions (K, D), which elements of the exemplar they are (K,), and the cut.
+        """
+        R = np.eye(len(centre)) if self.rotation is None else self.rotation(centre[None])[0].astype(np.float64)
+        tree = _tree(self.domain, placed) if len(placed) else None
+        best, least = (np.zeros((0, len(centre))), np.zeros(0, int)), np.inf
+        copies = self._copies()
+        # 1. propose
+        proposed = self._proposed(centre, R, cuts, rng)
+        cut = Cut(centre, proposed[0][0])
+        for middle, handicap in proposed:
+            # 2. cut
+            at = self.box[0] + np.mod(middle - self.box[0], self._period) if self.toroidal else middle
+            away = (copies - at) @ R.T
+            inside = (np.abs(away) <= self.radius).all(axis=1)
+            patch, elements = centre + away[inside], np.nonzero(inside)[0] % len(self.start)
+            # 3. compare
+            misfit = self._misfit(patch, elements, tree, handicap)
+            if misfit < least:
+                least, best, cut = misfit, (patch, elements), Cut(centre, middle)
+        return *best, cut
+
+    @property
+    def _period(self) -> np.ndarray:
+        return self.box[1] - self.box[0]
+
+    def _copies(self) -> np.ndarray:
+        """The exemplar's positions, with copies all around if it repeats: a patch may be wider than the exemplar."""
+        if not self.toroidal:
+            return self.start
+        dims = self.start.shape[1]
+        steps = np.stack(np.meshgrid(*[(-1, 0, 1)] * dims, indexing="ij"), axis=-1).reshape(-1, dims)
+        return (self.start + self._period * steps[:, None]).reshape(-1, dims)
+
+    def _proposed(self, centre: np.ndarray, R: np.ndarray, cuts: list[Cut], rng: np.random.Generator,
+                  ) -> list[tuple[np.ndarray, float]]:
+        """Places (D,) in the exemplar to cut from, and the misfit that each starts with."""
+        box = self.box
+        room = self._period / 2 if self.toroidal else np.maximum(0, self._period / 2 - self.radius)
+        tries = [(rng.uniform(-room, room) + (box[0] + box[1]) / 2, 0.0) for _ in range(TRIES)]
+        nearest = sorted(cuts, key=lambda c: float(np.sum((c.placed_at - centre) ** 2)))[:GO_ON]
+        going_on = [cut.cut_from + R.T @ (centre - cut.placed_at) for cut in nearest]
+        return tries + [(middle, CONTINUE) for middle in going_on
+                        if self.toroidal or ((middle > box[0]) & (middle < box[1])).all()]
+
+    def _misfit(self, patch: np.ndarray, elements: np.ndarray, tree: cKDTree | None, misfit: float) -> float:
+        """`misfit` and what a patch (K, D) of `elements` (K,) adds to it."""
+        if not len(patch):
+            return misfit + 10.0
+        out = self.domain.distance(patch) < 0
+        if self.mismatch is not None:
+            misfit += float(self.mismatch(patch, elements).mean())
+        if not self.toroidal:  # the borders of an exemplar that ends belong at those of the domain
+            misfit += float(out.mean())
+        if tree is not None and not out.all():
+            distance = tree.query(_unit(self.domain, patch[~out]))[0]
+            crowded = np.where(distance < SAME * self.spacing, 0.0, np.maximum(0, 1 - distance / self.spacing))
+            misfit += float(np.sum(crowded**2)) / len(patch) * 2
+        return misfit
 
 
 def _counted(placed: np.ndarray, source: np.ndarray, expected: int, held: int, domain: Domain, exemplar: Elements,
              allowed: Callable[[np.ndarray], np.ndarray] | None, rng: np.random.Generator,
              ) -> tuple[np.ndarray, np.ndarray]:
-    """Exactly `expected` elements: the most crowded go, and the widest gaps are filled. The first `held` stay."""
+    """Exactly `expected` elements: the most crowded are removed, or the widest gaps filled. The first `held` stay."""
     while len(placed) > expected:
         distance, index = _tree(domain, placed).query(_unit(domain, placed), k=2)
         crowd = np.where(np.arange(len(placed)) >= held, distance[:, 1], np.inf)
@@ -218,8 +274,8 @@ def _over_time(exemplar: Elements, placed: np.ndarray, source: np.ndarray, frame
 
 
 def carried(start: Copied, flow: Callable[[int, np.ndarray], np.ndarray]) -> Copied:
-    """The same with each element carried by a flow besides its own motion: flow(t, points) is the way of points (M, D)
-    from frame t to the next."""
+    """The same output with each element carried by a flow in addition to its own motion: flow(t, points) is the
+    displacement of points (M, D) from frame t to the next."""
     own = start.elements.positions.astype(np.float64)
     positions = own.copy()
     for t in range(1, len(own)):
@@ -232,8 +288,8 @@ def tracks(exemplar: Elements, source: np.ndarray, frames: int, begin: np.ndarra
            ) -> tuple[np.ndarray, np.ndarray]:
     """Which element in which frame of the exemplar each output element follows: two (T, E) int arrays.
 
-    It follows its source from frame `begin` (E,), default 0; at the exemplar's end it goes on where an element moves
-    most alike (position in details and its change), early enough to have frames ahead.
+    It follows its source from frame `begin` (E,), default 0; at the exemplar's end it continues where an element moves
+    most similarly (position in details and its change), early enough to have frames left.
     """
     count = len(source)
     element, frame = np.zeros((frames, count), int), np.zeros((frames, count), int)
@@ -244,10 +300,10 @@ def tracks(exemplar: Elements, source: np.ndarray, frames: int, begin: np.ndarra
         return element, frame
     moved = exemplar.positions if exemplar.coarse is None else exemplar.positions - exemplar.coarse
     state = moved.astype(np.float64)
-    if exemplar.coarse is None:  # a place in the plane is not a state: only the motion is
+    if exemplar.coarse is None:  # the position of a free element is not compared: only its motion is
         state = state * 0.0
     pace = np.diff(moved.astype(np.float64), axis=0) * 3.0
-    early = max(1, int(exemplar.frames * JUMP_WITHIN))
+    early = max(1, int(exemplar.frames * JUMP_BEFORE))
     features = np.concatenate([state[:-1], pace], axis=3).reshape(exemplar.frames - 1, exemplar.count, -1)
     tree = cKDTree(features[:early].reshape(early * exemplar.count, -1))
     for t in range(1, frames):
@@ -261,10 +317,10 @@ def tracks(exemplar: Elements, source: np.ndarray, frames: int, begin: np.ndarra
     return element, frame
 
 
-def _section(coarse: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """How elements lie beside each other (E, 3): their first samples in the first frame, in the local frame there."""
+def _section(coarse: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """The places of elements in the section (E, 3): their first samples in the first frame, in local axes."""
     first = coarse[0, :, 0].astype(np.float64)
-    return (first - first.mean(axis=0)) @ frames[0].astype(np.float64)
+    return (first - first.mean(axis=0)) @ axes[0].astype(np.float64)
 
 
 def _side_by_side(own: np.ndarray, middle: np.ndarray, neighbours: int, rng: np.random.Generator) -> np.ndarray:
@@ -278,22 +334,22 @@ def _side_by_side(own: np.ndarray, middle: np.ndarray, neighbours: int, rng: np.
         for m in np.ravel(tree.query(middle[n], k=min(neighbours, len(middle)))[1]).tolist():
             if source[m] >= 0 or len(taken) == len(own):
                 continue
-            apart = np.linalg.norm(own - (own[first] + middle[m] - middle[n]), axis=1)
-            apart[taken] = np.inf
-            source[m] = int(np.argmin(apart))
+            distance = np.linalg.norm(own - (own[first] + middle[m] - middle[n]), axis=1)
+            distance[taken] = np.inf
+            source[m] = int(np.argmin(distance))
             taken.append(int(source[m]))
     return source
 
 
-def on_coarse(exemplar: Elements, coarse: np.ndarray, frames_in: np.ndarray, frames_out: np.ndarray, neighbours: int,
+def on_coarse(exemplar: Elements, coarse: np.ndarray, axes_in: np.ndarray, axes_out: np.ndarray, neighbours: int,
               seed: int, rate: float) -> Copied:
     """Threads or sheets on given coarse positions: each takes the details of a whole element of the exemplar.
 
     coarse      (T, E, S, 3): C of the output
-    frames_in   local frames of the exemplar's samples (T·E·S, 3, 3), frames_out of the output's
-    neighbours  how many elements are copied as one patch: those side by side take exemplar elements side by side, and
-                all patches begin in the same frame, so that what lies side by side moves together. 1: each element by
-                itself, from a frame of its own
+    axes_in     local axes of the exemplar's samples (T·E·S, 3, 3); axes_out: of the output's
+    neighbours  number of elements copied as one patch: adjacent elements take adjacent exemplar elements, and all
+                patches begin in the same frame, so that neighbours move together. 1: each element separately, from a
+                frame of its own
     """
     rng = np.random.Generator(np.random.Philox(key=seed))
     total, count, samples = coarse.shape[:3]
@@ -303,13 +359,13 @@ def on_coarse(exemplar: Elements, coarse: np.ndarray, frames_in: np.ndarray, fra
         source = rng.integers(0, exemplar.count, (count,))
         begin = rng.integers(0, latest, (count,))
     else:
-        source = _side_by_side(_section(exemplar.coarse, frames_in), _section(coarse, frames_out), neighbours, rng)
+        source = _side_by_side(_section(exemplar.coarse, axes_in), _section(coarse, axes_out), neighbours, rng)
         begin = np.full(count, rng.integers(latest))
     element, at = tracks(exemplar, source, total, begin)
-    q = np.einsum("nji,nj->ni", frames_in, (exemplar.positions - exemplar.coarse).reshape(-1, 3)).reshape(
+    q = np.einsum("nji,nj->ni", axes_in, (exemplar.positions - exemplar.coarse).reshape(-1, 3)).reshape(
         exemplar.positions.shape)
     details = q[at, element]
-    positions = coarse + np.einsum("nij,nj->ni", frames_out, details.reshape(-1, 3)).reshape(coarse.shape)
+    positions = coarse + np.einsum("nij,nj->ni", axes_out, details.reshape(-1, 3)).reshape(coarse.shape)
     first_sample = (at * exemplar.count + element)[..., None] * samples
     return Copied(
         Elements(positions, exemplar.grid, rate, exemplar.size[source], exemplar.kind[source],

@@ -166,7 +166,7 @@ def shells(positions: np.ndarray, thickness: np.ndarray, colour: np.ndarray, fin
     middle, normal = _fitted(positions, fine)
     count, rows, columns = middle.shape[:3]
     half = 0.5 * np.asarray(thickness, float)[:, None, None, None] * normal
-    upper, lower = ((middle + way * half).reshape(count, -1, 3) for way in (1, -1))
+    upper, lower = ((middle + sign * half).reshape(count, -1, 3) for sign in (1, -1))
     loop = _border(rows, columns)
     vertices = np.concatenate([upper, lower, lower[:, loop], upper[:, loop]], 1)
     return assembled(vertices, _shell_faces(rows, columns), np.asarray(colour))

@@ -1,12 +1,12 @@
-"""Neighbourhoods n(s) of samples in space and time (ma13 §3.2): which samples, and where they lie from s.
+"""Neighbourhoods n(s) of samples in space and time (ma13 §3.2): which samples, and their offsets from s.
 
 A neighbourhood has two parts. Samples that topology or time ties to s, those beside it along its thread or on its
 sheet and itself in the frames before and after, stand at fixed offsets and are matched by these ("topological
 constraints precede the Hungarian algorithm"). Samples of other elements within the radius are matched by it.
 
-For the tied samples û is the difference of details q, where q(s) = R(s)ᵀ (p(s) - C(s)) is what the coarse position
-C(s) does not explain, in the local frame R(s): a bend of C is then no difference. For the others û is the difference
-of positions in the local frame of s.
+For the tied samples û is the difference of details q, where q(s) = R(s)ᵀ (p(s) - C(s)) is the part of the position
+that C(s) does not explain, along the local axes R(s): a bend of C then makes no difference. For the others û is the
+difference of positions along the local axes of s.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from synth.elements.samples import Elements
 
 THREADS = min(8, os.cpu_count() or 1)  # each has a frame's neighbours in memory
 AT_REST = 100.0  # default weight of the motion of an exemplar that has none
-NEAREST_QUANTILE = 0.1  # of the distances to the nearest sample: what the spacing of an exemplar is called
+NEAREST_QUANTILE = 0.1  # of the distances to the nearest sample: the spacing of an exemplar
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Shape:
     radius   spatial extent, world units
     before   frames before that of s
     after    frames after it: 0 makes the neighbourhood temporally causal
-    whole    other samples in all those frames; else, compact, only s itself there
+    whole    other samples in all those frames; else (compact) only s itself is
     along    samples on each side along a thread, or in each direction on a sheet: 3 is 7 and 7×7
-    most     other samples that count, the nearest first
+    most     number of other samples, at most; the nearest are taken
     motion   weight of the motion, the samples tied in time, against the arrangement; see `search.tied_weight`
     sigma    σ_p of Eq. 10, world units (it divides the square of a distance, as printed: length²); inf: no falloff
     sigma_t  σ_t of Eq. 10, frames²
@@ -93,15 +93,15 @@ def at_offsets(elements: Elements, offsets: np.ndarray) -> np.ndarray:
     return np.where(inside, np.arange(len(time))[:, None] + step, -1)
 
 
-def details(elements: Elements, frames: np.ndarray | None) -> np.ndarray:
-    """q(s) = R(s)ᵀ (p(s) - C(s)), (T·E·S, D) float32; `frames` (T·E·S, D, D) are the R(s), None: none is turned."""
+def details(elements: Elements, axes: np.ndarray | None) -> np.ndarray:
+    """q(s) = R(s)ᵀ (p(s) - C(s)), (T·E·S, D) float32; axes (T·E·S, D, D) are the R(s), None: the domain's."""
     moved = elements.positions if elements.coarse is None else elements.positions - elements.coarse
     flat = moved.reshape(-1, elements.dimensions)
-    return flat.copy() if frames is None else np.einsum("nji,nj->ni", frames, flat)
+    return flat.copy() if axes is None else np.einsum("nji,nj->ni", axes, flat)
 
 
 def spacing(positions: np.ndarray, period: np.ndarray | None = None) -> float:
-    """The nearest distance between samples of different elements, in which Table 2 measures radii.
+    """The distance between nearest samples of different elements, the unit of the radii in Table 2.
 
     positions (T, E, S, D); period (D,) of a toroidal domain. It is a low quantile of the distances of samples to their
     nearest, so that one close pair does not decide.
@@ -125,7 +125,7 @@ def others(positions: np.ndarray, shape: Shape, active: np.ndarray, period: np.n
     """Samples of other elements within the radius, the nearest first: (len(active)·E·S, B·most) int32, -1 for none.
 
     positions  (T, E, S, D) float32
-    active     the frames whose samples are asked for; the B frames in `shape.times` from each are looked at
+    active     the frames whose samples are considered; others are searched in the B frames `shape.times` from each
     period     (D,) of a toroidal domain
     stretch    of the radius
     An element counts once, by its nearest sample, where it has several: a neighbouring thread is one neighbour.
@@ -136,23 +136,25 @@ def others(positions: np.ndarray, shape: Shape, active: np.ndarray, period: np.n
     centres = {int(t): positions[t].reshape(-1, dims) for frame in active for t in frame + np.array(shape.times)
                if 0 <= t < frames}
 
-    def look(n: int) -> None:
+    def find(n: int) -> None:
         for b, time in enumerate(shape.times):
             other = int(active[n]) + time
             if other in trees:
                 centre = wrapped(centres[int(active[n])], period)
-                found[n, :, b] = _within(trees[other], centre, shape.radius * stretch, shape.most, samples, size)
+                found[n, :, b] = _nearest_others(trees[other], centre, shape.radius * stretch, shape.most, samples,
+                                                 size)
                 found[n, :, b][found[n, :, b] >= 0] += other * size
 
-    # frames share nothing, so that any number of threads finds the same
+    # frames are independent: the result does not depend on the number of threads
     with ThreadPoolExecutor(THREADS) as pool:
         trees = dict(zip(centres, pool.map(lambda points: _tree(points, period), centres.values()), strict=True))
-        list(pool.map(look, range(len(active))))
+        list(pool.map(find, range(len(active))))
     return found.reshape(-1, len(shape.times) * shape.most)
 
 
 def wrapped(points: np.ndarray, period: np.ndarray | None) -> np.ndarray:
-    """Points (M, D) float64 in the one unit of a domain that repeats with `period` (D,), 0 along axes that end."""
+    """Points (M, D) float64 wrapped into one period of a domain that repeats with `period` (D,), 0 along axes that
+    end."""
     inside = points.astype(np.float64)
     for axis in np.flatnonzero(period) if period is not None else ():
         inside[:, axis] = np.mod(inside[:, axis], period[axis])  # type: ignore[index]
@@ -165,7 +167,7 @@ def _tree(points: np.ndarray, period: np.ndarray | None) -> cKDTree:
     return cKDTree(wrapped(points, period), boxsize=period)
 
 
-def _within(tree: cKDTree, centre: np.ndarray, radius: float, most: int, samples: int, size: int) -> np.ndarray:
+def _nearest_others(tree: cKDTree, centre: np.ndarray, radius: float, most: int, samples: int, size: int) -> np.ndarray:
     """The nearest sample of each of the `most` nearest other elements within the radius, (size, most), -1 for none."""
     asked = min(size, (most + 1) * (1 if samples == 1 else min(samples, 6)) + 1)
     distance, index = tree.query(centre, k=asked, distance_upper_bound=radius)

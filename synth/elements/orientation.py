@@ -1,4 +1,5 @@
-"""Local frames R(s): which way is along, across and up for a sample ("directions, such as left and up, are determined
+"""Local axes R(s): which direction is along, across and up for a sample ("directions, such as left and up, are
+determined
 by user-specified orientation fields", ma13 §3.2)."""
 
 from __future__ import annotations
@@ -9,17 +10,17 @@ TINY = 1e-12
 
 
 def along_threads(coarse: np.ndarray) -> np.ndarray:
-    """Frames (T·E·S, 3, 3) float32 of threads at the coarse positions (T, E, S, 3).
+    """Axes (T·E·S, 3, 3) float32 of threads at the coarse positions (T, E, S, 3).
 
-    Columns of R: across, beside, along the thread from its first sample. The frame at the first sample of the first
-    frame holds x as well as it can; from there it is carried along the thread, and from frame to frame at the first
-    sample, by the smallest rotation (no twist and no flip).
+    Columns of R: across, beside, along the thread from its first sample. At the first sample of the first frame
+    `across` is as near to x as possible; from there the axes are carried along the thread, and from frame to frame at
+    the first sample, by the smallest rotation (no twist and no flip).
     """
     tangent = _unit(np.gradient(coarse.astype(np.float64), axis=2))
     frames, count, samples = coarse.shape[:3]
     across = np.empty_like(tangent)
     first = np.broadcast_to(np.array([1.0, 0.0, 0.0]), (count, 3))
-    # where a thread starts along x, another direction is the one to hold
+    # where a thread starts along x, y is taken instead
     first = np.where(np.abs(tangent[0, :, 0, :1]) > 0.9, np.array([0.0, 1.0, 0.0]), first)
     across[0, :, 0] = _unit(first - _dot(first, tangent[0, :, 0]) * tangent[0, :, 0])
     for t in range(1, frames):
@@ -31,7 +32,7 @@ def along_threads(coarse: np.ndarray) -> np.ndarray:
 
 
 def on_sheets(coarse: np.ndarray, grid: tuple[int, ...]) -> np.ndarray:
-    """Frames (T·E·S, 3, 3) float32 of sheets of grid (rows, columns) at the coarse positions (T, E, S, 3).
+    """Axes (T·E·S, 3, 3) float32 of sheets of grid (rows, columns) at the coarse positions (T, E, S, 3).
 
     Columns of R: along the columns' direction, the rows' (made orthogonal), and the normal.
     """
@@ -43,12 +44,12 @@ def on_sheets(coarse: np.ndarray, grid: tuple[int, ...]) -> np.ndarray:
 
 
 def along(coarse: np.ndarray, grid: tuple[int, ...]) -> np.ndarray:
-    """Frames (T·E·S, 3, 3) float32 of threads, or of sheets, by their grid, at the coarse positions (T, E, S, 3)."""
+    """Axes (T·E·S, 3, 3) float32 of threads, or of sheets, by their grid, at the coarse positions (T, E, S, 3)."""
     return along_threads(coarse) if len(grid) == 1 else on_sheets(coarse, grid)
 
 
 def along_directions(direction: np.ndarray) -> np.ndarray:
-    """Frames (N, D, D) float32 whose first column is `direction` (N, D); zero directions leave the axes.
+    """Axes (N, D, D) float32 whose first column is `direction` (N, D), x where it is zero.
 
     In 3-D the third column is as upright (+y) as it can be, so that nothing rolls.
     """

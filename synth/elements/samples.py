@@ -51,9 +51,9 @@ class Elements:
             if value is None:
                 continue
             value = np.ascontiguousarray(value, dtype)
-            wanted = self.positions.shape if name in ("positions", "coarse") else np.shape(given[name])
-            if value.shape != wanted:
-                raise ValueError(f"{name} of {count} elements is {wanted}, not {value.shape}")
+            expected = self.positions.shape if name in ("positions", "coarse") else np.shape(given[name])
+            if value.shape != expected:
+                raise ValueError(f"{name} of {count} elements is {expected}, not {value.shape}")
             bad = np.argwhere(~np.isfinite(value))
             if len(bad):
                 where = (f"frame {bad[0][0] + 1}, element {bad[0][1] + 1}" if value.ndim == 4

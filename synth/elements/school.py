@@ -5,13 +5,13 @@
     mixed        a few large fish among small ones (9e, "spatially heterogeneous")
     tracked      fish whose tracks were taken from a film (11a)
 
-Each returns its elements and the school's speed, world units per second. The school swims along +x, and its mean motion
-is taken out of the positions: they are those in a frame that swims with it, in which fish only drift. To see them swim,
-add speed × time to x. No simulated fish drifts back as fast as the frame swims: none swims backwards (§7). y is up.
+Each returns its elements and the school's speed, world units per second. The school swims along +x; positions are
+relative to its mean motion, so that fish only drift. To see them swim, add speed × time to x. No simulated fish drifts
+back faster than that speed: none swims backwards (§7). y is up.
 
-The first three are simulated in a box that repeats, so that every fish has neighbours all round. A fish seeks a
-velocity of its own that wanders slowly, is carried by a slow flow that all share, and yields to fish that are near,
-sooner to one ahead or behind than to one beside it. All these forces are continuous: tracks are smooth.
+The first three are simulated in a box that repeats, so that every fish has neighbours on all sides. A fish seeks a
+velocity of its own that changes slowly, is carried by a slow flow common to all, and avoids fish that are near, ahead
+or behind from farther than beside. All these forces are continuous: tracks are smooth.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from scipy.spatial import cKDTree
 from synth.elements.samples import Elements
 
 LENGTH = 0.8  # of a small fish, in spacings
-AHEAD = 1.35  # how much farther fish keep from one another ahead than beside
+AHEAD = 1.35  # how much more distance fish keep ahead than beside
 DENSITY = 0.5  # small fish in a cubic spacing
 STEPS = 4  # of the simulation in a frame
-BEFORE = 6.0  # seconds that pass before the first frame
+BEFORE = 6.0  # seconds simulated before the first frame
 RESPONSE = 0.45  # seconds in which a fish takes on the velocity that it seeks
-YIELD = 14.0  # spacings per s²: of two fish in one place
+YIELD = 14.0  # spacings per s²: push between two fish at one place
 CONFINE = 8.0  # spacings per s², one radius outside of a group
-DARTS = 0.15  # by how much more room a fish has, in shares, for each spacing per second at which it darts
-CLOSE, DRAWS = 0.4, 10  # spacings: darts are drawn again while fish brush past one another nearer than that
+DARTS = 0.15  # increase of a fish's room, as a share, per spacing per second of its dart
+CLOSE, DRAWS = 0.4, 10  # spacings: darts are drawn anew, up to DRAWS times, while fish pass nearer than CLOSE
 WANDER = np.array([0.26, 0.13, 0.30])  # rms of a fish's own velocity x, y, z, spacings per second
 CARRY = 0.26  # rms of the shared flow, spacings per second
 SILVER, AMBER = (0.55, 0.66, 0.74), (0.88, 0.56, 0.26)
@@ -62,7 +62,7 @@ def homogeneous(count: int = 40, frames: int = 60, *, spacing: float = 1.0, spee
                 seed: int = 0) -> tuple[Elements, float]:
     """A school that is everywhere alike (ma13 figure 9a): count fish in a box that repeats.
 
-    spacing  about the distance of a fish from its nearest, world units; speed in spacings per second
+    spacing  about the distance of a fish from its nearest neighbour, world units; speed in spacings per second
     Raises ValueError for fewer than 8 fish, fewer than 2 frames, or a speed at which fish may swim backwards.
     """
     _check(count, frames, spacing, speed, rate)
@@ -96,23 +96,23 @@ def crossing(count: int = 32, frames: int = 60, *, groups: int = 2, crossers: in
     extent = np.array([2 * radii[0] + 1.5, 2 * radii[1] + 1.5, groups * (2 * radii[2] + 1.3)])
     middle = np.stack([np.full(groups, extent[0] / 2), np.full(groups, extent[1] / 2),
                        (np.arange(groups) + 0.5) * extent[2] / groups], 1)[group]
-    way = np.array([speed * crossing_time * 0.35, 0.0, extent[2] / groups])
+    displacement = np.array([speed * crossing_time * 0.35, 0.0, extent[2] / groups])
     # to the next group and, of two, back
     side = np.where((group == 1) & (groups == 2), -1.0, 1.0)[:, None] * np.array([0, 0, 1]) + np.array([1, 1, 0])
     drawn: list[tuple[Elements, float]] = []
-    apart: list[float] = []
-    while len(drawn) < DRAWS and max(apart, default=0) < CLOSE:
+    clearances: list[float] = []
+    while len(drawn) < DRAWS and max(clearances, default=0) < CLOSE:
         start = middle + rng.uniform(-0.6, 0.6, (count, 3)) * radii
-        # who crosses is at the rim of its group or within it, as it happens
+        # fish that cross start anywhere in their group
         leaves = np.full(count, np.inf)
         leaves[:crossers] = (rng.permutation(crossers) + rng.uniform(0.2, 0.8, crossers)) / max(crossers, 1)
         leaves = leaves * ((frames - 1) / rate - crossing_time * 0.9) - crossing_time * 0.05
         school = _School(extent, start, np.full(count, 0.55), np.ones(count),
-                         functools.partial(_crossed, middle, leaves, side * way, crossing_time), radii)
+                         functools.partial(_crossed, middle, leaves, side * displacement, crossing_time), radii)
         length = LENGTH * rng.normal(1, 0.05, count).clip(0.85, 1.15)
         drawn.append(_shown(school, frames, spacing, speed, rate, rng, length, np.zeros(count, int)))
-        apart.append(_nearest(drawn[-1][0]) / spacing)
-    return drawn[int(np.argmax(apart))]
+        clearances.append(_nearest(drawn[-1][0]) / spacing)
+    return drawn[int(np.argmax(clearances))]
 
 
 def _nearest(elements: Elements) -> float:
@@ -167,7 +167,7 @@ def _shown(school: _School, frames: int, spacing: float, speed: float, rate: flo
            length: np.ndarray, kind: np.ndarray) -> tuple[Elements, float]:
     """The simulated school as elements, in world units."""
     tracks = _simulated(school, frames, rate, rng)
-    # the frame swims steadily, at the mean velocity; what is left starts in the box
+    # subtract the mean velocity, which is constant; the tracks then start in the box
     drift = (tracks[-1] - tracks[0]).mean(0) / (frames - 1)
     tracks -= np.arange(frames)[:, None, None] * drift
     tracks -= school.extent * np.floor(tracks[0] / school.extent)
@@ -194,7 +194,7 @@ def _simulated(school: _School, frames: int, rate: float, rng: np.random.Generat
             centre, moved, quickened = school.centre(time)
             sought += moved
             push += quickened + _confining(place - centre, school.radii)
-            # others see a fish that darts from afar
+            # fish avoid one that darts from farther away
             room = room * (1 + DARTS * np.linalg.norm(moved, axis=1))
         push += _yielding(place, school.extent, room)
         velocity += step * ((sought - velocity) / RESPONSE + push)
@@ -207,7 +207,7 @@ def _yielding(place: np.ndarray, extent: np.ndarray, room: np.ndarray) -> np.nda
     than one beside."""
     squeezed = np.array([AHEAD, 1.0, 1.0])
     box = extent / squeezed
-    # rounding may give the box's own length, which is its beginning
+    # rounding may give the length of the box, which is the same as 0
     inside = (place / squeezed) % box
     inside[inside >= box] = 0
     tree = cKDTree(inside, boxsize=box)
@@ -228,24 +228,28 @@ def _confining(offset: np.ndarray, radii: np.ndarray | None) -> np.ndarray:
     return -CONFINE * np.clip(reach - 1, 0, None) / np.maximum(reach, 1e-6) * scaled
 
 
-def _crossed(middle: np.ndarray, leaves: np.ndarray, way: np.ndarray, lasts: float, time: float) -> np.ndarray:
-    """Centres of the fish's groups (E, 3), their velocities and accelerations, stacked: who leaves goes its way (E, 3)
-    with the least jerk."""
+def _crossed(middle: np.ndarray, leaves: np.ndarray, displacement: np.ndarray, lasts: float, time: float
+             ) -> np.ndarray:
+    """Centres of the fish's groups (E, 3), their velocities and accelerations, stacked. From its time in `leaves` (E,)
+    on
+    a fish moves by its displacement (E, 3) with minimum jerk."""
     s = np.clip((time - leaves) / lasts, 0, 1)[:, None]
-    return np.stack([middle + way * s**3 * (10 + s * (6 * s - 15)), way / lasts * 30 * (s * (1 - s)) ** 2,
-                     way / lasts**2 * 60 * s * (1 - s) * (1 - 2 * s)])
+    return np.stack([middle + displacement * s**3 * (10 + s * (6 * s - 15)),
+                     displacement / lasts * 30 * (s * (1 - s)) ** 2,
+                     displacement / lasts**2 * 60 * s * (1 - s) * (1 - 2 * s)])
 
 
 def _wandering(rng: np.random.Generator, count: int) -> Callable[[float], np.ndarray]:
-    """Velocities (E, 3) at a time that the fish seek of their own: three slow sines along each axis."""
+    """The velocities (E, 3) that the fish seek at a time: three slow sines along each axis."""
     pace = 2 * np.pi * rng.uniform(0.10, 0.42, (3, count, 3))
     phase = rng.uniform(0, 2 * np.pi, (3, count, 3))
     return lambda time: WANDER * np.sqrt(2 / 3) * np.sin(pace * time + phase).sum(0)
 
 
 def _carrying(rng: np.random.Generator, extent: np.ndarray) -> Callable[[np.ndarray, float], np.ndarray]:
-    """Velocities (E, 3) at places (E, 3) and a time of a flow that all share: four travelling waves across their
-    directions, which makes it free of divergence, each with whole lengths in the box."""
+    """Velocities (E, 3), at places (E, 3) and a time, of a flow common to all: four travelling transverse waves, so
+    that
+    it is free of divergence, each with a whole number of wavelengths in the box."""
     number = np.array([[1, 0, 0], [1, 0, 1], [0, 1, 1], [1, 1, -1]]) * rng.choice([-1, 1], (4, 1))
     wave = 2 * np.pi * number / extent
     along = rng.normal(size=(4, 3)) * np.array([0.6, 0.5, 1.0])
@@ -264,8 +268,8 @@ def tracked(tracks: np.ndarray, rate: float, *, spacing: float = 1.0, length: fl
     spacing    world units: tracks are scaled so that the median distance of a fish from its nearest is this
     length     of a fish, in spacings
     smoothing  frames, odd, of the window in which a track is a cubic polynomial (Savitzky and Golay)
-    A tracker's steps of a pixel are smoothed, and the mean motion taken out: positions are those in a frame that moves
-    with the school's middle and turns with its heading, x ahead and y to its left.
+    A tracker's steps of a pixel are smoothed, and the mean motion is removed: positions are relative to the school's
+    middle and heading, x ahead and y to the left.
     Raises ValueError for tracks of one fish, of fewer frames than the window, with gaps, or of a school at rest.
     """
     pixels = np.asarray(tracks, np.float64)
@@ -282,7 +286,7 @@ def tracked(tracks: np.ndarray, rate: float, *, spacing: float = 1.0, length: fl
         raise ValueError(f"frame {gap[0][0] + 1}, element {gap[0][1] + 1} is not finite")
     smooth = signal.savgol_filter(pixels * [1, -1], smoothing, 3, axis=0)
     middle = smooth.mean(1)
-    # the heading is that of the school as a whole: not of each swerve
+    # the heading is that of the school as a whole, not of each swerve
     velocity = ndimage.gaussian_filter1d(np.gradient(middle, axis=0), smoothing / 2, axis=0, mode="nearest")
     pace = np.linalg.norm(velocity, axis=1)
     if not pace.mean() > 1e-3:

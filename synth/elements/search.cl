@@ -20,13 +20,13 @@ int at_offset(int s, __constant const int *offset, int frames, int size) {
     return s + (there - frame) * size + offset[1] * COLUMNS + offset[2];
 }
 
-// The least cost of matching n points with m: matched pairs cost[j][k] in all, what stays alone[j] and lone[k].
-// A pair may stay apart: then both count as if the other had left the neighbourhood. Jonker and Volgenant's shortest
-// augmenting paths over rows; each row has besides the columns one of its own, being alone. `partner[j]` becomes the
-// column of row j, or -1.
-float hungarian(int n, int m, const float *cost, const float *alone, const float *lone, int *partner) {
+// The least cost of matching n rows with m columns: a pair costs cost[j][k], a row without a partner unmatched[j], a
+// column without one column_unmatched[k], as if its partner had left the neighbourhood. Jonker and Volgenant's shortest
+// augmenting paths over rows; besides the m columns each row has one of its own, for staying unmatched. `partner[j]`
+// becomes the column of row j, or -1.
+float hungarian(int n, int m, const float *cost, const float *unmatched, const float *column_unmatched, int *partner) {
     float u[K + 1], v[K + 1], least[K + 1];
-    int row_of[K + 1], way[K + 1];
+    int row_of[K + 1], previous[K + 1];
     bool used[K + 1];
     for (int k = 0; k <= m; k++) {
         v[k] = 0.0f;
@@ -38,7 +38,7 @@ float hungarian(int n, int m, const float *cost, const float *alone, const float
         // column m is where the path starts
         int column = m, last = -1;
         row_of[m] = j;
-        float least_alone = INFINITY;
+        float least_unmatched = INFINITY;
         for (int k = 0; k <= m; k++) {
             least[k] = INFINITY;
             used[k] = false;
@@ -48,26 +48,26 @@ float hungarian(int n, int m, const float *cost, const float *alone, const float
             const int row = row_of[column];
             int next = -1;
             float delta = INFINITY;
-            if (alone[row] - u[row] < least_alone) {
-                least_alone = alone[row] - u[row];
+            if (unmatched[row] - u[row] < least_unmatched) {
+                least_unmatched = unmatched[row] - u[row];
                 last = column;
             }
             for (int k = 0; k < m; k++) {
                 if (used[k])
                     continue;
-                const float reduced = cost[row * K + k] - lone[k] - u[row] - v[k];
+                const float reduced = cost[row * K + k] - column_unmatched[k] - u[row] - v[k];
                 if (reduced < least[k]) {
                     least[k] = reduced;
-                    way[k] = column;
+                    previous[k] = column;
                 }
                 if (least[k] < delta) {
                     delta = least[k];
                     next = k;
                 }
             }
-            const bool ends_alone = least_alone <= delta;
-            if (ends_alone)
-                delta = least_alone;
+            const bool ends_unmatched = least_unmatched <= delta;
+            if (ends_unmatched)
+                delta = least_unmatched;
             for (int k = 0; k <= m; k++)
                 if (used[k]) {
                     u[row_of[k]] += delta;
@@ -75,14 +75,14 @@ float hungarian(int n, int m, const float *cost, const float *alone, const float
                         v[k] -= delta;
                 } else
                     least[k] -= delta;
-            least_alone -= delta;
-            column = ends_alone ? last : next;
-            if (ends_alone || row_of[column] < 0)
+            least_unmatched -= delta;
+            column = ends_unmatched ? last : next;
+            if (ends_unmatched || row_of[column] < 0)
                 break;
         }
-        // each row on the path moves on to the next column; the last one into a free column, or out of all
-        for (; column != m; column = way[column])
-            row_of[column] = row_of[way[column]];
+        // each row on the path moves to the next column; the last one to a free column, or stays unmatched
+        for (; column != m; column = previous[column])
+            row_of[column] = row_of[previous[column]];
     }
     float sum = 0.0f;
     for (int j = 0; j < n; j++)
@@ -91,20 +91,20 @@ float hungarian(int n, int m, const float *cost, const float *alone, const float
         if (row_of[k] >= 0)
             partner[row_of[k]] = k;
         else
-            sum += lone[k];
+            sum += column_unmatched[k];
     for (int j = 0; j < n; j++)
-        sum += partner[j] < 0 ? alone[j] : cost[j * K + partner[j]];
+        sum += partner[j] < 0 ? unmatched[j] : cost[j * K + partner[j]];
     return sum;
 }
 
-// What one output sample is compared by, gathered once.
+// The neighbourhood of one output sample, gathered once.
 typedef struct {
     float other[B * K * D];
     float falloff[B * K];
-    float alone[B * K];
+    float unmatched[B * K];
     int others[B];
     float tied[(F > 0 ? F : 1) * D];
-    int tie[F > 0 ? F : 1];  // 1: there; 0: not there; -1: its frame is not there, which says nothing
+    int tie[F > 0 ? F : 1];  // 1: there; 0: not there; -1: its frame does not exist yet, not compared
     float detail[D];
     float control;
     int allowed;
@@ -112,7 +112,7 @@ typedef struct {
 
 // The distance (Eq. 9) to the exemplar's neighbourhood `in`; INFINITY as soon as it is known to be `limit` or more.
 float distance_to(const Neighborhood *o, int in, float limit, int *partner, __global const float *in_other,
-                  __global const float *in_falloff, __global const float *in_alone, __global const int *in_others,
+                  __global const float *in_falloff, __global const float *in_unmatched, __global const int *in_others,
                   __global const float *in_tied, __global const char *in_tie, __constant const float *tied_weight,
                   __global const float *in_detail, __global const float *in_control, __global const int *in_label,
                   float centre_weight, float control_weight, float missing) {
@@ -121,8 +121,8 @@ float distance_to(const Neighborhood *o, int in, float limit, int *partner, __gl
     const float difference = o->control - in_control[in];
     float sum = control_weight * difference * difference;
     for (int d = 0; d < D; d++) {
-        const float apart = o->detail[d] - in_detail[in * D + d];
-        sum += centre_weight * apart * apart;
+        const float delta = o->detail[d] - in_detail[in * D + d];
+        sum += centre_weight * delta * delta;
     }
     for (int f = 0; f < F; f++) {
         if (o->tie[f] < 0)
@@ -133,8 +133,8 @@ float distance_to(const Neighborhood *o, int in, float limit, int *partner, __gl
         }
         float squared = 0.0f;
         for (int d = 0; o->tie[f] && d < D; d++) {
-            const float apart = o->tied[f * D + d] - in_tied[(in * F + f) * D + d];
-            squared += apart * apart;
+            const float delta = o->tied[f * D + d] - in_tied[(in * F + f) * D + d];
+            squared += delta * delta;
         }
         sum += tied_weight[f] * squared;
     }
@@ -145,18 +145,18 @@ float distance_to(const Neighborhood *o, int in, float limit, int *partner, __gl
         if (sum >= limit)
             return INFINITY;
         float cost[K * K];
-        float lone[K], nearest[K];
+        float column_unmatched[K], nearest[K];
         for (int k = 0; k < m; k++)
-            lone[k] = nearest[k] = in_alone[base + k];
-        // no matching is cheaper than each row's, or each column's, own nearest
+            column_unmatched[k] = nearest[k] = in_unmatched[base + k];
+        // a lower bound: no matching costs less than the cheapest choice of each row, or of each column
         float by_rows = 0.0f, by_columns = 0.0f;
         for (int j = 0; j < n; j++) {
-            float least = o->alone[b * K + j];
+            float least = o->unmatched[b * K + j];
             for (int k = 0; k < m; k++) {
                 float squared = 0.0f;
                 for (int d = 0; d < D; d++) {
-                    const float apart = o->other[(b * K + j) * D + d] - in_other[(base + k) * D + d];
-                    squared += apart * apart;
+                    const float delta = o->other[(b * K + j) * D + d] - in_other[(base + k) * D + d];
+                    squared += delta * delta;
                 }
                 const float pair = 0.5f * (o->falloff[b * K + j] + in_falloff[base + k]) * squared;
                 cost[j * K + k] = pair;
@@ -169,7 +169,7 @@ float distance_to(const Neighborhood *o, int in, float limit, int *partner, __gl
             by_columns += nearest[k];
         if (sum + fmax(by_rows, by_columns) >= limit)
             return INFINITY;
-        sum += hungarian(n, m, cost, o->alone + b * K, lone, partner + b * K);
+        sum += hungarian(n, m, cost, o->unmatched + b * K, column_unmatched, partner + b * K);
     }
     return sum < limit ? sum : INFINITY;
 }
@@ -178,8 +178,8 @@ float distance_to(const Neighborhood *o, int in, float limit, int *partner, __gl
 __kernel void nearest(__global const int *samples,        // (M) output samples that are asked for
                       __global const float *position,     // (all, D)
                       __global const float *detail,       // (all, D)
-                      __global const float *axes,         // (all, D, D), or one number where none is turned
-                      int turned, int known,              // frames from 0 to known - 1 are synthesized
+                      __global const float *axes,         // (all, D, D), or one number if there are none
+                      int rotated, int known,             // frames from 0 to known - 1 are synthesized
                       __constant const float *period,     // (D), 0 along axes that do not repeat
                       __global const int *neighbors,      // (M, B * K)
                       __constant const int *offsets,      // (F, 3)
@@ -191,7 +191,7 @@ __kernel void nearest(__global const int *samples,        // (M) output samples 
                       float centre_weight, float control_weight, float missing,
                       __global const float *in_other,     // (in, B * K, D)
                       __global const float *in_falloff,   // (in, B * K)
-                      __global const float *in_alone,     // (in, B * K)
+                      __global const float *in_unmatched, // (in, B * K)
                       __global const int *in_others,      // (in, B)
                       __global const float *in_tied,      // (in, F, D)
                       __global const char *in_tie,        // (in, F)
@@ -200,14 +200,14 @@ __kernel void nearest(__global const int *samples,        // (M) output samples 
                       __global const int *in_label,       // (in)
                       __global const int *candidates,     // (M, C), -1 for none
                       __global int *match,                // (M, N)
-                      __global float *apart,              // (M, N)
+                      __global float *distance,           // (M, N)
                       __global int *slot)                 // (M, N, B * K): place in the match's own list, or -1
 {
     const int i = get_global_id(0), s = samples[i];
     Neighborhood o;
-    float turn[D * D];
+    float R[D * D];
     for (int d = 0; d < D * D; d++)
-        turn[d] = turned ? axes[s * D * D + d] : (d % (D + 1) == 0 ? 1.0f : 0.0f);
+        R[d] = rotated ? axes[s * D * D + d] : (d % (D + 1) == 0 ? 1.0f : 0.0f);
     for (int b = 0; b < B; b++) {
         const int there = s / SIZE + times[b];
         o.others[b] = there < 0 || there >= known ? -1 : 0;
@@ -226,12 +226,12 @@ __kernel void nearest(__global const int *samples,        // (M) output samples 
             for (int d = 0; d < D; d++) {
                 float sum = 0.0f;
                 for (int e = 0; e < D; e++)
-                    sum += turn[e * D + d] * away[e];
+                    sum += R[e * D + d] * away[e];
                 o.other[j * D + d] = sum;
             }
             o.falloff[j] = exp(-squared / sigma) * time_falloff[b];
             const float rest = fmax(0.0f, radius - sqrt(squared));
-            o.alone[j] = o.falloff[j] * rest * rest;
+            o.unmatched[j] = o.falloff[j] * rest * rest;
         }
     }
     for (int d = 0; d < D; d++)
@@ -256,8 +256,8 @@ __kernel void nearest(__global const int *samples,        // (M) output samples 
         const int in = C > 0 ? candidates[i * C + c] : c;
         if (in < 0)
             continue;
-        const float found = distance_to(&o, in, least[N - 1], partner, in_other, in_falloff, in_alone, in_others, in_tied,
-                                        in_tie, tied_weight, in_detail, in_control, in_label, centre_weight,
+        const float found = distance_to(&o, in, least[N - 1], partner, in_other, in_falloff, in_unmatched, in_others,
+                                        in_tied, in_tie, tied_weight, in_detail, in_control, in_label, centre_weight,
                                         control_weight, missing);
         if (!(found < least[N - 1]))
             continue;
@@ -273,10 +273,10 @@ __kernel void nearest(__global const int *samples,        // (M) output samples 
         for (int k = 0; k < B * K; k++)
             partner[k] = -1;
         if (best[n] >= 0)
-            distance_to(&o, best[n], INFINITY, partner, in_other, in_falloff, in_alone, in_others, in_tied, in_tie,
+            distance_to(&o, best[n], INFINITY, partner, in_other, in_falloff, in_unmatched, in_others, in_tied, in_tie,
                         tied_weight, in_detail, in_control, in_label, centre_weight, control_weight, missing);
         match[i * N + n] = best[n];
-        apart[i * N + n] = least[n];
+        distance[i * N + n] = least[n];
         for (int k = 0; k < B * K; k++)
             slot[(i * N + n) * B * K + k] = partner[k];
     }
@@ -294,7 +294,7 @@ int added(__global int *list, int length, int sample) {
     return length + 1;
 }
 
-// The candidates of one output sample: what its own match and its neighbours' matches say it is, and the exemplar's
+// The candidates of one output sample: its own matches, those that its neighbours' matches suggest, and the exemplar's
 // samples most similar to these [Tong et al. 2002].
 __kernel void coherent(__global const int *samples,      // (M)
                        __global const int *neighbors,    // (all, B * K) of all samples that have a match
@@ -311,7 +311,7 @@ __kernel void coherent(__global const int *samples,      // (M)
     for (int n = 0; n < N; n++)
         length = added(list, length, match[s * N + n]);
     for (int f = 0; f < F; f++) {
-        // the samples next to it are enough: they carry on what lies farther
+        // adjacent samples are enough: they pass on what lies farther
         if (abs(offsets[3 * f]) > 1 || abs(offsets[3 * f + 1]) > 1 || abs(offsets[3 * f + 2]) > 1)
             continue;
         const int other = at_offset(s, offsets + 3 * f, FRAMES, SIZE);
@@ -332,7 +332,7 @@ __kernel void coherent(__global const int *samples,      // (M)
             if (self < 0 || self / SAMPLES != s / SAMPLES || slot[other * N * B * K + back] < 0)
                 continue;
             const int in = in_neighbors[match[other * N] * B * K + back / K * K + slot[other * N * B * K + back]];
-            // its list names the sample nearest to it: go from there along the element
+            // its list holds the nearest sample of each element: go from there along the element
             const int column = in % SAMPLES + s - self;
             if (column >= 0 && column < SAMPLES)
                 length = added(list, length, in + s - self);

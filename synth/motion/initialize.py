@@ -159,11 +159,11 @@ def _block_owners(cells: np.ndarray, centres: np.ndarray, axes: np.ndarray,
     return index[rows, nearest], offset[rows, nearest].astype(np.float32)
 
 
-def empty_blocks(H: np.ndarray, axes: np.ndarray, legs: np.ndarray, edges: tuple[int, int, int],
+def empty_blocks(H: np.ndarray, axes: np.ndarray, basis: np.ndarray, edges: tuple[int, int, int],
                  mean: float) -> Iterator[tuple[tuple[slice, ...], np.ndarray]]:
     """The places where H (Z, Y, X, 3) has run empty, one after the other: the caller fills each before the next.
 
-    A place is as large as a block of `edges` along `legs` (3, 3), the rows in local coordinates; it is empty where the
+    A place is as large as a block of `edges` along `basis` (3, 3), the rows in local coordinates; it is empty where the
     mean square of H over it is below EMPTY of `mean`. Yields the box of cells round the block and their offsets from
     its middle along its local axes (z, y, x, 3).
     """

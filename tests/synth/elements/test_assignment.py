@@ -19,7 +19,7 @@ def problem(seed: int) -> tuple[np.ndarray, Predictions, Anchors, np.ndarray]:
 
 
 def energy(positions: np.ndarray, terms: Predictions, anchors: Anchors) -> float:
-    away = positions[terms.to] - positions[terms.of] - terms.way
+    away = positions[terms.to] - positions[terms.of] - terms.offset
     return float(np.sum(terms.weight[:, None] * away**2)
                  + np.sum(anchors.weight[:, None] * (positions[anchors.sample] - anchors.target) ** 2))
 
@@ -34,7 +34,7 @@ def test_solved_is_the_least_squares_solution(seed: int) -> None:
     rows[np.arange(len(terms.to)), terms.of] -= 1
     rows[[-2, -1], anchors.sample] = 1
     root = np.sqrt(np.concatenate([terms.weight, anchors.weight]))[:, None]
-    right = np.vstack([terms.way, anchors.target]) - rows[:, ~free] @ positions[~free]
+    right = np.vstack([terms.offset, anchors.target]) - rows[:, ~free] @ positions[~free]
     best = np.linalg.lstsq(root * rows[:, free], root * right, rcond=None)[0]
     assert np.allclose(found[free], best, atol=0.02)  # each is held where it is by STAY
     assert energy(found, terms, anchors) < 1.001 * energy(np.where(free[:, None], 0, positions) + np.zeros((12, 2))
@@ -95,7 +95,7 @@ def test_predictions_of_the_exemplar_itself_are_true(grid: tuple[int, ...]) -> N
     terms = assignment.predictions(within, output, carried, matches, np.arange(3))
     flat = turned.reshape(-1, 3)
     assert len(terms.to) > count
-    assert np.allclose(flat[terms.to] - flat[terms.of], terms.way, atol=1e-4)
+    assert np.allclose(flat[terms.to] - flat[terms.of], terms.offset, atol=1e-4)
     if coarse is not None:
         anchors = assignment.centred(within, output, carried, matches, np.arange(3), 1.0)
         assert np.allclose(anchors.target, flat[anchors.sample], atol=1e-4)

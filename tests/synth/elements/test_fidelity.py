@@ -43,7 +43,7 @@ def test_a_spectrum_shows_its_frequency() -> None:
     assert np.argmax(fidelity.spectrum(positions)) == 8
 
 
-def test_apart_and_jitter() -> None:
+def test_difference_and_jitter() -> None:
     assert fidelity.difference(np.ones(4), np.ones(4)) == 0 and fidelity.difference(np.ones(4), 2 * np.ones(4)) == 1
     even = np.arange(5.0)[:, None, None, None] * np.ones((1, 2, 1, 2))
     assert fidelity.jitter(even) == 0

@@ -64,9 +64,9 @@ def test_the_kernel_finds_what_the_reference_finds(name: str, coherent: bool) ->
         assert (matches.sample[samples, 0] >= -1).all()
         candidates = matches.sample[samples]
     centre = searcher.centre
-    found, apart, slot = search.nearest_reference(
+    found, distance, slot = search.nearest_reference(
         within, output, samples, matches.neighbors[samples], 2, candidates, centre, 0.3, searcher.missing)
-    assert np.allclose(apart, matches.apart[samples], rtol=1e-4, atol=1e-5)
+    assert np.allclose(distance, matches.distance[samples], rtol=1e-4, atol=1e-5)
     same = found == matches.sample[samples]
     assert same.mean() > 0.98
     assert (slot == matches.slot[samples]).all(axis=2)[same].mean() > 0.98
@@ -82,7 +82,7 @@ def test_an_exemplar_matches_itself() -> None:
     output.allowed[:] = -1
     searcher.nearest(output, np.arange(3), matches)
     assert (matches.sample[:, 0] == np.arange(27)).all()
-    assert matches.apart.max() < 1e-8
+    assert matches.distance.max() < 1e-8
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -99,7 +99,7 @@ def test_matching_with_samples_left_over(seed: int) -> None:
 
 def test_a_sample_coming_in_over_the_rim_changes_nothing_at_once() -> None:
     shape = Shape(1.0)
-    apart = []
+    distance = []
     for x in (0.999, 1.001):
         positions = np.array([[0, 0], [0.5, 0], [x, 0.01]], np.float32)[None, :, None]
         within = search.exemplar(Elements(np.array([[0, 0], [0, 0.6]], np.float32)[None, :, None]), shape)
@@ -107,5 +107,5 @@ def test_a_sample_coming_in_over_the_rim_changes_nothing_at_once() -> None:
         search.Searcher(within, 1, coherent=False).nearest(
             search.Output(positions, np.zeros((3, 2), np.float32), None, 1, None, np.zeros(3, np.float32),
                           np.ones(3, np.int32)), np.arange(1), matches)
-        apart.append(matches.apart[0, 0])
-    assert abs(apart[0] - apart[1]) < 1e-3
+        distance.append(matches.distance[0, 0])
+    assert abs(distance[0] - distance[1]) < 1e-3

@@ -93,7 +93,7 @@ def test_lengths_and_angles_are_kept():
     np.testing.assert_allclose(np.sum(a * b, -1), np.sum(H * other, -1), atol=1e-5)
 
 
-def test_the_frame_turned_back_undoes_it():
+def test_the_axes_rotated_back_undo_it():
     H, frame = flow((9, 8), 1), axes_2d(flow((9, 8), 3))
     np.testing.assert_allclose(to_world(to_world(H, frame), frame * np.float32([1, -1])), H, atol=1e-6)
 
