@@ -5,15 +5,16 @@ In the order data passes through them:
     field       a field that knows its grid and its units
     opencl      the one home of OpenCL: device, build, launch
     advect      semi-Lagrangian advection [Stam 1999]
-    projection  Helmholtz-Hodge projection, exact in a box, and past obstacles
     noise       curl noise [Bridson et al. 2007]
-    obstacle    solids, as a signed distance field
+    obstacle    obstacles, as a signed distance field
+    projection  Helmholtz-Hodge projection, exact in a box, and past obstacles
     wake        a river past a round stone [Bridson et al. 2007]
     smoke       a simulated plume [Stam 1999; Fedkiw et al. 2001]
     pyramid     image pyramids of fields
-    blades      a bed of seaweed that a motion field bends
-    particles   carried by a motion, past obstacles
     motion/     motion field texture synthesis (ma09)
+    elements/   dynamic element textures (ma13)
+    particles   particles carried by a motion field, past obstacles
+    seaweed     a bed of seaweed that a motion field bends
 
 Arrays are C order float32: (Y, X[, 2]) or (Z, Y, X[, 3]), components x, y, z, row 0 the lowest, cell
 centres at integers, velocities in cells per frame. The domain is one world unit high, its floor at y = 0,

@@ -1,8 +1,8 @@
-"""Obstacles: solids in the flow, as a signed distance field and its normals (ma09 §3.6, figures 7 and 8).
+"""Obstacles in the flow, as a signed distance field and its normals (ma09 §3.6, figures 7 and 8).
 
-Shapes have their exact distance. All else (a picture, a drawing, a mesh as voxels, a level set) is sampled on a grid
-finer than the domain's cells, where an exact distance transform measures it. World units: the domain is 1 high, its
-floor at y = 0, centred on x and z.
+Basic shapes have their exact distance. All others (an image, a drawing, a mesh as voxels, a level set) are sampled on
+a grid finer than the domain's cells, where an exact distance transform gives the distance. World units: the domain is
+1 high, its floor at y = 0, centred on x and z.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from scipy import ndimage
 
 from synth.field import Field, domain_origin
 
-# samples along each axis of a cell: in the plane, in space, and in space where there are too many cells
+# samples along each axis of a cell, in 2-D and in 3-D; one in 3-D where that exceeds MOST_SAMPLES
 FINE = {2: 4, 3: 2}
 MOST_SAMPLES = 2**25
-# a tone is ink where it differs from the paper's by this share of the picture's range
+# a tone is ink where it differs from the paper's by this share of the image's range
 INK = 0.25
 
 
@@ -54,26 +54,26 @@ def outward(distance: np.ndarray) -> np.ndarray:
 
 
 def ball(shape: tuple[int, ...], centre: Sequence[float], radius: float) -> Obstacle:
-    """A disc, or in space a ball; centre and radius in world units."""
+    """A disc, or in 3-D a ball; centre and radius in world units."""
     squared = sum(away**2 for away in _away(shape, centre))
     return Obstacle(((np.sqrt(squared) - radius) * shape[-2]).astype(np.float32))
 
 
 def box(shape: tuple[int, ...], centre: Sequence[float], half: Sequence[float], angle: float = 0.0) -> Obstacle:
-    """A box of half edges `half` (D of them), turned by `angle` degrees in the x-y plane; world units."""
+    """A box of half edges `half` (D of them), rotated by `angle` degrees in the x-y plane; world units."""
     if len(half) != len(shape):
         raise ValueError(f"a box of {len(shape)} dimensions has so many half edges, not {len(half)}")
     x, y, *rest = _away(shape, centre)
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    turned = (c * x + s * y, c * y - s * x, *rest)
-    beyond = np.broadcast_arrays(*(np.abs(away) - edge for away, edge in zip(turned, half, strict=True)))
+    rotated = (c * x + s * y, c * y - s * x, *rest)
+    beyond = np.broadcast_arrays(*(np.abs(away) - edge for away, edge in zip(rotated, half, strict=True)))
     outside = np.sqrt(sum(np.maximum(b, 0) ** 2 for b in beyond))
     inside = np.minimum(np.maximum.reduce(beyond), 0)
     return Obstacle(((outside + inside) * shape[-2]).astype(np.float32))
 
 
 def _away(shape: tuple[int, ...], centre: Sequence[float]) -> list[np.ndarray]:
-    """For each component x, y[, z] the way from `centre` to each cell, world units, ready to broadcast."""
+    """For each component x, y[, z] the offset of each cell from `centre`, world units, ready to broadcast."""
     if len(centre) != len(shape):
         raise ValueError(f"a centre in {len(shape)} dimensions has so many coordinates, not {len(centre)}")
     axes = [origin + np.arange(n) / shape[-2] - middle
@@ -84,7 +84,7 @@ def _away(shape: tuple[int, ...], centre: Sequence[float]) -> list[np.ndarray]:
 def picture(shape: tuple[int, ...], solid: np.ndarray, centre: Sequence[float], height: float) -> Obstacle:
     """A mask (rows, columns), lowest row first, solid above 0.5, as high as `height` round `centre` (x, y).
 
-    In space it is a prism along z.
+    In 3-D it is a prism along z.
     """
     rows, columns = solid.shape
     pixel = height / rows
@@ -96,7 +96,7 @@ def picture(shape: tuple[int, ...], solid: np.ndarray, centre: Sequence[float], 
 def drawn(tones: np.ndarray) -> np.ndarray:
     """The solids of a drawing (rows, columns), 0 to 1, as a mask for `picture`: ink, and what ink encloses.
 
-    The paper is the median tone of the picture's edge. Raises ValueError for a picture without ink.
+    The paper is the median tone of the image's edge. Raises ValueError for an image without ink.
     """
     edge = np.concatenate([tones[0], tones[-1], tones[:, 0], tones[:, -1]])
     difference = np.abs(tones - np.median(edge))
@@ -125,10 +125,10 @@ def outlines(polygons: Sequence[np.ndarray], shape: tuple[int, int]) -> np.ndarr
 
 
 def level_set(shape: tuple[int, ...], field: Field) -> Obstacle:
-    """What a scalar field says is solid, where it is negative, at any voxel size and origin.
+    """The obstacle where a scalar field is negative; the field has any voxel size and origin.
 
-    Only where it changes sign matters, so a narrow band will do. Beyond the field there is no solid. A field in
-    space meets a domain of the plane with its section at z = 0.
+    Only its zero level matters, so a narrow band is enough. Outside the field there is no obstacle. Of a 3-D field a
+    2-D domain takes the section at z = 0.
     """
     if field.is_vector or field.dimension < len(shape):
         raise ValueError("a level set is a scalar field of the domain's dimension")
@@ -150,9 +150,9 @@ def level_set(shape: tuple[int, ...], field: Field) -> Obstacle:
 
 
 def voxels(shape: tuple[int, ...], filled: np.ndarray, pitch: float, origin: Sequence[float]) -> Obstacle:
-    """What voxels (Z, Y, X) bool fill that a surface touches or encloses, of edge `pitch` and first centre `origin`.
+    """The obstacle of voxels (Z, Y, X) bool that a surface touches or encloses, of edge `pitch`, the first at `origin`.
 
-    Its surface lies half a voxel inside them, on average. A domain of the plane is met at z = 0.
+    Its surface lies half a voxel inside them, on average. A 2-D domain takes the section at z = 0.
     """
     grown = np.pad(filled, 3)
     away = ndimage.distance_transform_edt(~grown) - ndimage.distance_transform_edt(grown)

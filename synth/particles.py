@@ -1,7 +1,7 @@
 """Particles carried by the final motion F (ma09 figure 7: "direct rendering from the final motion fields F").
 
-A particle lives a fixed number of frames and is born again anywhere in the flow, so that the flow stays evenly filled
-whatever its divergence; one that leaves comes in again where the flow comes in. None is ever inside an obstacle.
+A particle lives a fixed number of frames and is then placed anywhere in the flow, so that the flow stays evenly filled
+whatever its divergence; one that leaves is placed where the flow enters. None is ever inside an obstacle.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from synth.obstacle import outward
 
-# steps of the Runge-Kutta integration in a frame: a particle turns a good part of a small swirl in one
+# steps of the Runge-Kutta integration in a frame: in one frame a particle covers much of a small swirl
 STEPS = 2
 # a particle is kept at least this far from a wall, cells
 CLEAR = 0.3
@@ -78,7 +78,7 @@ def moved(particles: Particles, before: np.ndarray, after: np.ndarray, life: int
     position[left] = _coming_in(int(left.sum()), after, distance, random)
     position[old] = _anywhere(int(old.sum()), shape, distance, random)
     age[old] = 0
-    age[left] = random.integers(0, life, int(left.sum()))  # as if they had come from beyond
+    age[left] = random.integers(0, life, int(left.sum()))  # as if they had entered from outside
     return Particles(position.astype(np.float32), sampled(after, position), age.astype(np.int32))
 
 
@@ -110,9 +110,9 @@ def _anywhere(count: int, shape: tuple[int, ...], distance: np.ndarray | None,
 
 
 def _coming_in(count: int, F: np.ndarray, distance: np.ndarray | None, random: np.random.Generator) -> np.ndarray:
-    """Positions (count, D) float32 just inside the border, as dense as the flow that comes in there.
+    """Positions (count, D) float32 just inside the border, in proportion to the inflow there.
 
-    Anywhere if nothing comes in.
+    Anywhere if there is no inflow.
     """
     shape = F.shape[:-1]
     dimension = len(shape)
@@ -132,7 +132,7 @@ def _coming_in(count: int, F: np.ndarray, distance: np.ndarray | None, random: n
     summed = np.cumsum(amount, dtype=np.float64)
     chosen = np.searchsorted(summed, random.random(count) * summed[-1], side="right")
     chosen = np.minimum(chosen, len(place) - 1)
-    # from the border, as far in as the flow has brought it since it crossed
+    # from the border, as far inside as the flow carries it in the time since it crossed
     position = cells[place[chosen]] + random.random((count, dimension)) - 0.5
     rows, across = np.arange(count), side_of[chosen]
     since, v = random.random(count), velocity[place[chosen]]

@@ -2,8 +2,8 @@
 
 Velocities and pressure lie at cell centres, and derivatives are central differences (ghost cells carry the
 border condition), so `project` is an orthogonal projection for `divergence` itself: a cosine, sine or
-Fourier transform solves the pressure equation to rounding, without iterations. Central differences do not
-see the checkerboard mode; they leave it in the field.
+Fourier transform solves the pressure equation to rounding, without iterations. Central differences
+are blind to the checkerboard mode and leave it in the field.
 
 With an obstacle the divergence of a cell is what flows out through the open parts of its faces [Batty et al. 2007],
 the velocity on a face being the mean of its two cells: central differences wherever all is open. The pressure's
@@ -29,7 +29,7 @@ REMAINING = 2e-5
 MOST_ITERATIONS = 3000
 # a face less open than this counts as closed: slivers would make the pressure equation stiff
 SLIVER = 0.15
-# modes that central differences do not see have this eigenvalue in the preconditioner
+# modes invisible to central differences have this eigenvalue in the preconditioner
 UNSEEN = 1e-3
 
 # ghost cell = sign * the outermost cell: (of the velocity along its own axis, of the pressure)
@@ -150,7 +150,7 @@ def _outflow(v: np.ndarray, shares: list[np.ndarray], border: str) -> np.ndarray
 
 
 def _push(p: np.ndarray, shares: list[np.ndarray], border: str) -> np.ndarray:
-    """The gradient of a pressure as cells feel it: the mean of its differences over the open parts of their faces.
+    """The pressure gradient that acts on cells: the mean of its differences over the open parts of their faces.
 
     With cells weighted by their open share it is -1 times the transpose of `_outflow`.
     """
@@ -196,9 +196,9 @@ def _along_walls(v: np.ndarray, closed: np.ndarray, distance: np.ndarray) -> np.
 
 
 def _pressure(source: np.ndarray, border: str, unseen_as: float = 0.0) -> np.ndarray:
-    """Solve div grad p = source, mode by mode; modes that no difference sees stay zero.
+    """Solve div grad p = source, mode by mode; modes invisible to differences stay zero.
 
-    With `unseen_as` no eigenvalue counts as nearer to zero than that, and all modes are solved for.
+    With `unseen_as`, eigenvalues are at most minus that, and all modes are solved for.
     """
     axes = tuple(range(source.ndim))
     if border == "toroidal":

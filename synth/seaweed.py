@@ -1,12 +1,13 @@
-"""A bed of seaweed bent by a motion field (ma09 figure 9: "use that to direct the movements of points on the seaweed
-polygonal models").
+"""A bed of seaweed bent by a motion field (ma09 figure 9).
 
-    bed      where plants stand and what each blade is like: once for a scene
-    spines   the points of every blade, directed by the field: once for a frame
+"Use that to direct the movements of points on the seaweed polygonal models":
+
+    bed      the places of plants and the shape of each blade: once per scene
+    spines   the points of every blade, bent by the field: once per frame
     ribbons  the blades as one mesh
 
 A blade is clamped at its root and keeps its length: its direction is found step by step from the root to the tip,
-out of the direction at rest and the motion at the point reached, which counts the more the nearer the tip. The
+from the direction at rest and the motion at the current point, which counts more towards the tip. The
 motion is that of a short window of frames (a blade follows the water with a lag, the tip with the longest), so a
 frame's blades depend on no other frame's blades, and can be made alone.
 
@@ -43,7 +44,7 @@ class Species:
     width: float  # half the blade's width over its length
     spread: float  # lean of the outer blades at rest, from upright
     ruffle: float  # of the edges, in half widths
-    stiffness: float  # share of its direction that a blade hands on from one point to the next
+    stiffness: float  # share of its direction that a blade keeps from one point to the next
     belly: float  # where it is broadest: 0 at the root, 1 at the tip
     colours: tuple[tuple[float, float, float], tuple[float, float, float]]  # sRGB: at the root, at the tip
 
@@ -100,7 +101,7 @@ def bed(width: float, depth: float, height: float, spacing: float, cover: float,
     if not len(ground):
         raise ValueError(f"no plant finds room on a floor of {width:g} × {depth:g} heights, {spacing:g} apart")
     grown = np.clip(0.62 + 1.3 * vigour, 0, 1)
-    # a species keeps together, more or less
+    # plants of a species grow together, roughly
     kin = gradient_noise([ground[:, 0] / KIN + 5.2, ground[:, 1] / KIN + 9.4], seed + 1)
     kin += rng.normal(0, 0.2, len(ground))
     rank = (np.argsort(np.argsort(kin)) + 0.5) / len(kin)
@@ -134,9 +135,8 @@ def spines(plants: Bed, motion: Sequence[Field], bend: float) -> np.ndarray:
     """The points (B, SAMPLES, 3) of every blade, world units, root first.
 
     motion  F of the frames of the window, oldest first, the last one this frame's: 3-D, world units per second
-    bend    how far a flow of one height per second bends a tip: the tangent of its angle, where it is at rest
-            upright
-    A tip follows the motion with half the window's length as its lag, a root at once.
+    bend    how far a flow of one height per second bends a tip that is upright at rest: the tangent of its angle
+    A tip follows the motion with a lag of half the window, a root without lag.
     """
     if not motion or any(field.dimension != 3 or not field.is_vector for field in motion):
         raise ValueError("blades are bent by 3-D motion fields, one or more")
@@ -152,7 +152,7 @@ def spines(plants: Bed, motion: Sequence[Field], bend: float) -> np.ndarray:
         here = points[:, k - 1] + 0.5 * step * direction
         target = plants.lean + bend * s * _felt(motion, here, s)
         target /= np.linalg.norm(target, axis=1, keepdims=True)
-        # stiffness for the number of points: a finer spine has the same shape
+        # stiffness per segment: a spine of more points has the same shape
         keep = plants.stiffness[:, None] ** (24 / (SAMPLES - 1))
         direction = keep * direction + (1 - keep) * target
         direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
@@ -162,7 +162,7 @@ def spines(plants: Bed, motion: Sequence[Field], bend: float) -> np.ndarray:
 
 
 def _felt(motion: Sequence[Field], points: np.ndarray, s: float) -> np.ndarray:
-    """The motion (B, 3) that blades feel at `points`: a smooth mean over the window, at the tip (s = 1) of all."""
+    """The motion (B, 3) that acts on blades at `points`: a smooth mean over part of the window, at the tip all."""
     frames = len(motion)
     reach = 1 + s * (frames - 1)  # frames that count, back from this one
     age = (np.arange(frames)[::-1] + 0.5) / reach
@@ -175,7 +175,7 @@ def _felt(motion: Sequence[Field], points: np.ndarray, s: float) -> np.ndarray:
 
 
 def _sampled(field: Field, points: np.ndarray) -> np.ndarray:
-    """The field (B, 3) at world points, linear between cells; beyond its border as at its border."""
+    """The field (B, 3) at world points, linear between cells; edges repeat."""
     cells = ((points - np.array(field.origin)) / field.voxel_size).T[::-1]
     return np.stack([ndimage.map_coordinates(field.values[..., axis], cells, np.float64, 1, mode="nearest")
                      for axis in range(3)], 1)
@@ -194,7 +194,7 @@ def _above(direction: np.ndarray, least: np.ndarray) -> np.ndarray:
 def ribbons(plants: Bed, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The blades as one mesh: vertices (N, 3) float32, world units; triangles (M, 3) int32; colours (N, 3) uint8, sRGB.
 
-    points  (B, n, 3): the spines, root first; n as you like
+    points  (B, n, 3): the spines, root first; any n
     A blade is a ribbon of one layer, to be drawn from both sides: creased along its mid-rib, its edges ruffled.
     """
     count, n = points.shape[:2]
@@ -220,7 +220,7 @@ def ribbons(plants: Bed, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _carried_along(side: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Unit vectors (B, n, 3) across the tangents: `side` (B, 3), turned as little as the tangents turn."""
+    """Unit vectors (B, n, 3) across the tangents: `side` (B, 3), with the least rotation along the blade."""
     across = np.empty_like(tangent)
     here = side
     for k in range(tangent.shape[1]):

@@ -10,26 +10,27 @@
     N        how many matches predict together (§4.2), with weights ω_j (Eq. 12)
     Θ        constraints of the output (Eq. 5)
     C        coarse motion and shape, D = I - C the details (§5)
+    R(s)     local axes at s, q(s) = R(s)ᵀ (p(s) - C(s)) its detail
 
 The modules, in the order data passes through them:
 
     samples        what elements are: positions over time
     arrangement    exemplars of points at rest
     school         exemplars of fish
-    simulation     noodles and paper by physical simulation
-    handmade       the same by hand
+    simulation     exemplars of noodles and paper, and C of noodles, by physical simulation
+    keyframed      noodles and sheets in drawn motion
     bundle         C of threads: one motion for all, side by side
-    scraps         C of sheets: paper in a gust
+    falling_paper  C of sheets: paper in a gust
     decomposition  C of elements that were made elsewhere
-    orientation    local frames of samples
+    orientation    R(s), local axes of samples
     neighborhood   n(s), in space and time
     search         the exemplar samples that are most like each output sample
     constraints    Θ: domain, hard positions
-    initialize     the first guess: patches of the exemplar
+    initialize     the initial output: patches of the exemplar
     assignment     positions by what the matches predict
     collision      the extra solver step
     synthesis      all of it, all frames together or frame by frame
-    fidelity       how like its exemplar an output is
+    fidelity       statistics by which an output is compared with its exemplar
     mesh           surfaces of threads, sheets and particles
     fish           how fish swim, and their surfaces
 """

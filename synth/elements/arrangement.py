@@ -1,12 +1,12 @@
 """Arrangements: exemplars of points at rest in a unit that repeats (ma13 figure 8).
 
     poisson_disk     stochastic (a)
-    drawn            the dots of a picture (b)
-    jittered_grid    each point somewhere near its place in a grid (c)
+    drawn            the dots of an image (b)
+    jittered_grid    a grid with each point shifted at random (c)
     hexagonal_grid   regular (d)
 
-Each returns one frame of elements of one sample; their `box` is the unit, whose lower corner is the origin. Points lie
-in it, and on a torus: what leaves on one side comes in on the other.
+Each returns one frame of elements of one sample; their `box` is the unit, whose lower corner is the origin. The unit
+repeats toroidally, and points lie in it.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from scipy.spatial import cKDTree
 
 from synth.elements.samples import Elements
 
-TRIES = 30  # darts round each point before it rests (Bridson 2007, "k = 30")
-FINE = 24  # places per spacing and axis that are tried at last in the plane; a third of it in space
+TRIES = 30  # darts around each point before it is inactive (Bridson 2007, "k = 30")
+FINE = 24  # places per spacing and axis tried at the end in 2-D; a third of it in 3-D
 MOST = 20_000  # points of a unit: an exemplar is small
 RADIUS = 0.32  # of a point, in spacings
-INK = 0.2  # how far a colour is from the paper's, or from another kind's, to count as another: Euclidean, sRGB
+INK = 0.2  # least distance of a colour from the paper's, or from another kind's, to count as different: Euclidean, sRGB
 LEAST_DOT = 4  # pixels; smaller ones are specks
 
 
@@ -32,7 +32,7 @@ def poisson_disk(size: Sequence[float], spacing: float = 1.0, seed: int = 0) -> 
     """Points at random, no two nearer than `spacing`, and no room for another (ma13 figure 8a).
 
     size     extents x, y[, z] of the unit, world units: at least 2 spacings each
-    Bridson's darts round the points that are there, then all places of a fine grid that are still free.
+    Bridson's darts around the existing points, then all free places of a fine grid.
     Raises ValueError for a unit that is too small or holds more than MOST points.
     """
     extent = _extent(size, spacing)
@@ -123,13 +123,13 @@ def hexagonal_grid(counts: Sequence[int], spacing: float = 1.0) -> Elements:
 
 
 def drawn(picture: np.ndarray, spacing: float = 1.0) -> Elements:
-    """The dots of a picture (ma13 figure 8b, "manual art"): each patch of ink is a point in its middle.
+    """The dots of an image (ma13 figure 8b, "manual art"): each patch of ink is a point at its centroid.
 
     picture  (Y, X, 3) float from 0 to 1 or uint8, sRGB, bottom row first; the paper is its median colour. It is a
              tile: a dot may cross its border. Dots do not touch.
-    spacing  world units: the unit is scaled so that the median distance of a dot from its nearest is this
-    Dots of nearly the same colour are of one kind, numbered by how many there are, the commonest first; a dot's
-    size is the radius of a disc of its area. Raises ValueError for a picture without two dots.
+    spacing  world units: the median distance of a dot from its nearest neighbour after scaling
+    Dots of nearly the same colour are of one kind, numbered by frequency, the commonest first; a dot's size
+    is the radius of a disc of its area. Raises ValueError for an image without two dots.
     """
     _spacing(spacing)
     pixels = np.asarray(picture)
@@ -146,7 +146,7 @@ def drawn(picture: np.ndarray, spacing: float = 1.0) -> Elements:
     members = np.split(np.argsort(labels, axis=None, kind="stable"), np.cumsum(np.bincount(labels.ravel()))[:-1])[1:]
     points = np.array([_middle(np.stack(np.unravel_index(m, labels.shape)[::-1], 1) + 0.5, extent) for m in members])
     area = np.array([len(m) for m in members])
-    colour = np.array([np.median(colours.reshape(-1, 3)[m], axis=0) for m in members])  # not that of its rim
+    colour = np.array([np.median(colours.reshape(-1, 3)[m], axis=0) for m in members])  # not its rim's
     distance, _ = cKDTree(points, boxsize=extent).query(points, k=2)
     scale = spacing / np.median(distance[:, 1])
     return _points(points * scale, extent * scale, np.sqrt(area / np.pi) * scale, kind=_kinds(colour),
@@ -175,7 +175,7 @@ def _middle(coordinates: np.ndarray, extent: np.ndarray) -> np.ndarray:
 
 
 def _kinds(colour: np.ndarray) -> np.ndarray:
-    """Which kind (M,) each of M colours is of: that of the first colour so near that it is the same ink."""
+    """The kind (M,) of each of M colours: that of the first colour within INK of it."""
     inks: list[np.ndarray] = []
     kind = np.empty(len(colour), np.int64)
     for number, one in enumerate(colour):

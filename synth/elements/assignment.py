@@ -111,8 +111,7 @@ def _of_others(exemplar: Exemplar, output: Output, matches: Matches, samples: np
 
 
 def _with_shift(output: Output, of: np.ndarray, to: np.ndarray, offset: np.ndarray, weight: np.ndarray) -> Predictions:
-    """The terms in positions that are not wrapped, for pairs that are nearest across the border of a toroidal
-    domain."""
+    """The terms for positions that are not wrapped: offsets across the border of a toroidal domain, plus periods."""
     if output.period is not None:
         position = output.positions.reshape(-1, output.positions.shape[3])
         plain = position[to] - position[of]

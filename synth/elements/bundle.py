@@ -7,7 +7,7 @@ import numpy as np
 from synth.elements.mesh import carried_along
 from synth.elements.samples import Elements
 
-TIGHTEST = 0.8  # share by which the innermost thread of a bent bundle may be shorter than its middle
+TIGHTEST = 0.8  # share by which the innermost thread of a bent bundle may be shorter than the middle
 
 
 def section(count: int, spacing: float) -> np.ndarray:
@@ -15,7 +15,7 @@ def section(count: int, spacing: float) -> np.ndarray:
     reach = int(np.ceil(np.sqrt(count))) + 2
     column, row = (axis.ravel() for axis in np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)))
     grid = np.stack([column + 0.5 * (row % 2), row * np.sqrt(3) / 2], 1)
-    # off the grid's symmetries, so that no two are as near the middle
+    # off the grid's symmetries, so that no two are equally near the middle
     order = np.argsort(((grid - [0.23, 0.16]) ** 2).sum(1), kind="stable")[:count]
     return (grid[order] - grid[order].mean(0)) * spacing
 
@@ -33,9 +33,9 @@ def duplicated(curve: np.ndarray, count: int, spacing: float = 1.0, radius: floa
 
     curve    (T, S, 3), S ≥ 3, world units; its samples are equally far apart
     spacing  of the threads in the bundle's section, radius of a thread, world units
-    The section is carried along the curve and turns about it as little as it can, so that threads neither cross nor
-    spread where the curve bends, as long as it bends less sharply than the bundle is thick; where it does, they are
-    drawn together, no nearer than half their spacing. Positions are their own `coarse`.
+    The section is carried along the curve with the least rotation, so that threads neither cross nor spread where the
+    curve bends, while its radius of curvature exceeds the bundle's thickness; in sharper bends they are drawn together,
+    no nearer than half their spacing. Positions are their own `coarse`.
     Raises ValueError for a curve of another shape, that is not finite or stands still in a point, or count < 1.
     """
     middle = np.asarray(curve, np.float64)
@@ -56,7 +56,7 @@ def duplicated(curve: np.ndarray, count: int, spacing: float = 1.0, radius: floa
     other = np.cross(tangent, side)
     places = section(count, spacing)
     offset = places[:, 0, None, None] * side[:, None] + places[:, 1, None, None] * other[:, None]
-    # κ × offset towards the bend's centre is the share by which a thread is shorter there; at 1 it would turn back
+    # curvature × offset towards its centre is the share by which a thread is shorter there; at 1 it would reverse
     bend = np.gradient(tangent, axis=1) / length
     shorter = (offset * bend[:, None]).sum(-1).max(1)[:, None, :, None]
     drawn = np.minimum(1, TIGHTEST / np.maximum(shorter, 1e-9))

@@ -1,4 +1,4 @@
-"""Constraints of the output, Θ of Eq. 5 (ma13 §4.1): where elements may be, what they are near, where they must be.
+"""Constraints of the output, Θ of Eq. 5 (ma13 §4.1): the domain of elements, and hard positions.
 
 Each kind adds anchors to the assignment step (soft) and may correct positions after it (hard).
 """
@@ -13,7 +13,7 @@ from scipy import ndimage
 from synth.elements.assignment import Anchors
 from synth.elements.neighborhood import wrapped
 
-CORNERS = 4  # times that a sample is put on the nearest border: in a corner it then lies beyond another
+CORNERS = 4  # times that a sample is moved to the nearest border: in a corner it is then beyond another
 PULL = 4.0  # weight of a sample that is out of its domain, in terms of Eq. 7
 
 
@@ -33,7 +33,7 @@ class Domain:
     period: np.ndarray | None = None
 
     def wrapped(self, points: np.ndarray) -> np.ndarray:
-        """The points in the one unit that the grid covers."""
+        """The points wrapped into the period that the grid covers."""
         low = self.origin - self.cell / 2
         return low + wrapped(points - low, self.period)
 
@@ -83,7 +83,7 @@ class Constraints:
     domain   where samples stay; obstacles are holes in it
     margin   distance from its border that samples keep, world units
     pins     hard positions
-    hard     what lies outside after an assignment is put on the border; else it is only pulled
+    hard     samples outside after an assignment are moved to the border; else they are only pulled
     """
 
     domain: Domain | None = None
@@ -99,7 +99,7 @@ class Constraints:
         return Anchors(out + first, target, np.full(len(out), PULL))
 
     def enforced(self, positions: np.ndarray) -> np.ndarray:
-        """Positions (M, D), with what lies outside put on the border where it is hard."""
+        """Positions (M, D), those outside moved to the border if the constraint is hard."""
         if self.domain is None or not self.hard:
             return positions
         result = positions.copy()

@@ -1,4 +1,5 @@
-"""How like its exemplar an output is: pair correlation, motion spectrum, distance to the nearest; jitter (ma13 §4.2).
+"""Statistics by which an output is compared with its exemplar: pair correlation, motion spectrum, nearest distance, and
+jitter (ma13 §4.2).
 
 All take positions (T, E, S, D), world units, and look at whole elements by the middle of their samples.
 """
@@ -73,8 +74,7 @@ def statistics(positions: np.ndarray, spacing: float, period: np.ndarray | None 
 
 
 def _repeated(points: np.ndarray, period: np.ndarray | None, reach: float) -> np.ndarray:
-    """The points (M, D) of one period, and their copies in all directions as far as `reach`, which may be many
-    periods."""
+    """The points (M, D) of one period, and their copies in all directions as far as `reach` (even many periods)."""
     for axis in np.flatnonzero(period) if period is not None else ():
         unit = float(period[axis])  # type: ignore[index]
         many = int(np.ceil(reach / unit))

@@ -1,7 +1,7 @@
-"""Fish: how they swim on their tracks, and what they look like.
+"""Fish: how they swim along their tracks, and their surfaces.
 
-    swimming  which way fish look on their tracks, where their tail is in its beat, how they turn
-    bodies    with fins and eyes, bent by their beat and their turns: one mesh of all in a frame
+    swimming  headings, phases of the tail beat and bends of fish along their tracks
+    bodies    one mesh of all fish in a frame, with fins and eyes, bent by their beats and turns
 
 World units; y is up. Lengths of a body are shares of the fish's.
 """
@@ -28,21 +28,21 @@ PIVOT = 0.36  # s of the point that a track moves
 JOINTS = 33  # points of the spine
 WAVES = 0.95  # of the body's bend, from nose to tail
 SWAY = (0.020, -0.065, 0.135)  # how far a point sways: c0 + c1 s + c2 s², for a carangiform swimmer [Videler 1993]
-STEEPEST = 0.9  # rise of a fish's heading over its run, at most: it is drawn upright
+STEEPEST = 0.9  # slope of a fish's heading, at most: it is drawn upright
 LEAN = 0.55  # roll into a turn, radians per radian that the body bends
 LEAN_MOST = 0.6
 BEND_MOST = 1.3  # radians from nose to tail
-STRIDE = 0.7  # lengths that a fish swims in a beat of its tail
-CALM = 0.06  # seconds over which a track is smoothed before its heading is read
+STRIDE = 0.7  # lengths that a fish swims per beat of its tail
+CALM = 0.06  # seconds over which a track is smoothed to find its heading
 
 
 @dataclass(frozen=True)
 class Gait:
     """How fish swim on their tracks, of T frames and E fish.
 
-    heading  (T, E, 3), unit: which way they look
-    phase    (T, E), radians: where the tail is in its beat; grows, the faster they swim the faster
-    turn     (T, E), radians per length, positive to the left: how their bodies are bent
+    heading  (T, E, 3) unit directions
+    phase    (T, E) of the tail beat, radians; grows faster at higher speed
+    turn     (T, E) bend of the body, radians per length, positive to the left
     """
 
     heading: np.ndarray
@@ -53,7 +53,7 @@ class Gait:
 def swimming(track: np.ndarray, length: np.ndarray, rate: float, seed: int = 1) -> Gait:
     """How fish swim on tracks (T, E, 3), T ≥ 2, world units, at `rate` frames per second; length (E,), world units.
 
-    A fish that rests looks the way it looked, and beats slowly. Fish beat out of step, as `seed` tells.
+    A fish at rest keeps its heading, and beats slowly. The beats are out of phase, drawn by `seed`.
     """
     frames, count = track.shape[:2]
     smooth = ndimage.gaussian_filter1d(np.asarray(track, float), CALM * rate, axis=0, mode="nearest")
@@ -86,7 +86,7 @@ def bodies(position: np.ndarray, heading: np.ndarray, length: np.ndarray, colour
     length    (E,), colour (E, 3) sRGB in [0, 1]: of the flanks
     phase     (E,) radians: of the tail's beat
     turn      (E,) radians from nose to tail, positive to the left
-    detail    1 for a school; 2 and more for fish that are looked at
+    detail    1 for a school; 2 and more for close-ups
     """
     shape = _template(detail)
     ahead, left, up = _upright(np.asarray(heading, float), np.asarray(turn, float))
@@ -120,7 +120,7 @@ def _upright(heading: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndar
 def _bent(phase: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The spine (E, JOINTS, 2) ahead and left of the pivot, in lengths, and the directions (E, JOINTS, 2) to its left.
 
-    Its steps keep their length: the bend is one of directions.
+    Its segments keep their length: only directions are bent.
     """
     s = (np.arange(JOINTS - 1) + 0.5) / (JOINTS - 1)
     c0, c1, c2 = SWAY
@@ -133,7 +133,7 @@ def _bent(phase: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     at = PIVOT * (JOINTS - 1)
     low = int(at)
     spine -= (spine[:, low] + (at - low) * (spine[:, low + 1] - spine[:, low]))[:, None]
-    # a wave sways the pivot too
+    # the wave moves the pivot too
     spine[..., 1] += ((c0 + c1 * PIVOT + c2 * PIVOT**2) * np.sin(phase - 2 * np.pi * WAVES * PIVOT))[:, None]
     joint = np.concatenate([angle[:, :1], 0.5 * (angle[:, :-1] + angle[:, 1:]), angle[:, -1:]], 1)
     return spine, np.stack([np.sin(joint), np.cos(joint)], -1)
@@ -168,7 +168,7 @@ def _outline(profile: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def _half_width(s: float, y: float) -> float:
-    """How far a body's side is from the middle, at a height over the spine."""
+    """Half the width of a body at a height over the spine."""
     half, high, low = (float(np.interp(s, STATIONS, profile)) for profile in (FLANK, BACK, BELLY))
     return half * float(np.sqrt(max(1 - (y / (high if y > 0 else low)) ** 2, 0.05)))
 

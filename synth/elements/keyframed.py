@@ -1,10 +1,10 @@
-"""Exemplars by hand (ma13 figures 10d and 13b): drawn motion that no physics would make. Each loops.
+"""Keyframed exemplars (ma13 figures 10d and 13b): motion that no physics would make. Each loops.
 
     jagged     noodles in zigzags that open and close like an accordion
     folded     sheets that are creased and fold up and open again
     fluttering sheets along which waves run
 
-Threads and sheets keep their lengths exactly: only the angles of their parts are drawn.
+Threads and sheets keep their lengths exactly: only the angles of their parts are animated.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ def jagged(count: int = 14, frames: int = 60, *, samples: int = 40, length: floa
     """A bundle of zigzag noodles along +z from sample 0 ("jagged", ma13 figure 10d); the last frame leads to the first.
 
     leg    samples from one corner to the next; corners lie on samples, so they stay sharp
-    angle  degrees by which a leg leans from z on average, up to STEEPEST; it swings by a seventh of that, in a wave
-           that runs along the bundle, and the plane of the zigzag turns to and fro
+    angle  angle of a leg to z on average, degrees, up to STEEPEST; it swings by a seventh of that, in a wave
+           that runs along the bundle, and the plane of the zigzag rotates to and fro
     length, spacing, radius  of a noodle and of the bundle's section, world units
-    All noodles of the bundle zigzag together, for those that lie side by side would cross otherwise; what is theirs
-    alone is a slight lag. `coarse`: straight threads, spaced as the samples are on average.
+    All noodles of the bundle zigzag together, since neighbours would cross otherwise; each has only a slight lag of its
+    own. `coarse`: straight threads, spaced as the samples are on average.
     Raises ValueError for an angle out of range, legs that do not fit, or noodles too thick for their spacing.
     """
     _check(count, frames, rate)
@@ -50,7 +50,7 @@ def jagged(count: int = 14, frames: int = 60, *, samples: int = 40, length: floa
     plane = 0.5 * np.sin(loop - np.pi * part / (samples - 1) - lag + other) + rng.uniform(0, 2 * np.pi)
     step = np.stack([np.sin(lean) * np.cos(plane), np.sin(lean) * np.sin(plane), np.cos(lean)], -1)
     curve = np.concatenate([np.zeros((frames, count, 1, 3)), np.cumsum(step, 2)], 2) * (length / (samples - 1))
-    # a zigzag's middle, not its beginning, is on the section
+    # the middle of a zigzag, not its beginning, is on the section
     curve[..., :2] -= curve[:, :, : 2 * leg, :2].mean(2, keepdims=True).mean(0, keepdims=True)
     coarse = np.broadcast_to(straight(places, samples, curve[:, :, -1, 2].mean()), curve.shape)
     curve[..., :2] += places[:, None]
@@ -63,9 +63,9 @@ def folded(count: int = 9, frames: int = 60, *, side: int = 7, spacing: float = 
            angle: float = 62.0, rate: float = 24.0, seed: int = 0) -> Elements:
     """Sheets that are creased and fold and open (ma13 figure 13b); the last frame leads to the first.
 
-    angle  degrees by which a part leans at most, from 5 to 80
-    By turns a fan of six pleats, a letter of three parts, and a card of two, each along its columns or its rows; all
-    out of step. Creases lie on samples where side - 1 is a multiple of six. Sheets lie side by side as those of
+    angle  largest slope of a part, degrees, from 5 to 80
+    Alternately a fan of six pleats, a letter of three parts, and a card of two, each along its columns or its rows; all
+    out of phase. Creases lie on samples where side - 1 is a multiple of six. Sheets lie side by side as those of
     `simulation.sheets`; the middle of each rests. `coarse`: the same sheets, flat.
     Raises ValueError for another angle, fewer than one sheet or two frames, or a side of fewer than 3 samples.
     """
@@ -76,7 +76,7 @@ def folded(count: int = 9, frames: int = 60, *, side: int = 7, spacing: float = 
 
     def lean(sheet: int, along: np.ndarray, time: float) -> np.ndarray:
         parts = (6, 3, 2)[sheet % 3]
-        closed = 0.55 - 0.45 * np.cos(time + phase[sheet])  # never quite flat: the creases show
+        closed = 0.55 - 0.45 * np.cos(time + phase[sheet])  # never quite flat: the creases stay visible
         number = np.minimum((along * parts).astype(int), parts - 1)
         return np.radians(angle) * closed * (1 - 2 * (number % 2))
 
@@ -88,7 +88,7 @@ def fluttering(count: int = 9, frames: int = 60, *, side: int = 7, spacing: floa
                angle: float = 48.0, waves: float = 1.0, rate: float = 24.0, seed: int = 0) -> Elements:
     """Sheets along which a wave runs once while the clip lasts (ma13 figure 13b); the last frame leads to the first.
 
-    angle  degrees by which a part leans at most, from 5 to 80
+    angle  largest slope of a part, degrees, from 5 to 80
     waves  on a sheet, from 0.25 to 2
     Each sheet's wave runs in a direction of its own. The rest as `folded`.
     """
@@ -113,10 +113,10 @@ def _check(count: int, frames: int, rate: float) -> None:
 
 def _sheets(count: int, frames: int, side: int, spacing: float, thickness: float, rate: float, turns: np.ndarray,
             lean: Callable[[int, np.ndarray, float], np.ndarray], rng: np.random.Generator) -> Elements:
-    """Sheets bent as parts of cylinders, across a direction each.
+    """Sheets bent as parts of cylinders, each across its own direction.
 
     turns  (E,) radians from +x to the direction along which a sheet's profile changes
-    lean   radians by which the profile of a sheet rises, at shares 0 to 1 of the way along it, at a time 0 to 2π
+    lean   slope of a sheet's profile, radians, at positions from 0 to 1 along it, at a time from 0 to 2π
     """
     _check(count, frames, rate)
     if side < 3 or not (spacing > 0 and thickness > 0):

@@ -1,10 +1,10 @@
-"""Surfaces of elements: threads as tubes, sheets as shells, and solids for particles in the plane (fish: `fish`).
+"""Surfaces of elements: threads as tubes, sheets as shells, particles in 2-D as solid shapes (fish: `fish`).
 
     tubes   threads, round and smooth, with rounded ends
     sheets  sheets of one layer; shells: with a thickness
-    solids  particles of the plane as beads, discs, stars and leaves that lie on it
+    solids  particles in 2-D as beads, discs, stars and leaves that lie on the plane
 
-Each makes the surfaces of all elements in one frame as one mesh. Which vertex is which depends on the shape of the
+Each makes the surfaces of all elements in one frame as one mesh. The vertices' order depends on the shape of the
 arrays only, so an animation is one mesh that moves. World units; y is up.
 """
 
@@ -54,8 +54,8 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def _spline(samples: int, fine: int, smoothing: float) -> tuple[np.ndarray, np.ndarray]:
-    """What `samples` points in a row are multiplied with to get ((samples - 1) fine + 1) points of a smooth curve,
-    and its derivative: (points, samples) float64 each.
+    """The matrices that map `samples` points of a curve to ((samples - 1) fine + 1) points of a smooth curve,
+    and to its derivative: (points, samples) float64 each.
 
     smoothing  0: through the samples (natural cubic spline); 1: near them and without overshoot (cubic B-spline)
     Both start at the first sample and end at the last.
@@ -111,17 +111,17 @@ def tubes(positions: np.ndarray, radius: np.ndarray, colour: np.ndarray, sides: 
 
 
 def carried_along(curve: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Unit vectors (E, n, 3) across the tangents (E, n, 3) of curves (E, n, 3) that turn about them as little as they
-    can, by double reflection [Wang et al. 2008]."""
+    """Unit vectors (E, n, 3) across the tangents (E, n, 3) of curves (E, n, 3), with the least
+    rotation about them, by double reflection [Wang et al. 2008]."""
     side = np.empty_like(tangent)
-    # an odd direction: threads that run along it are rare
+    # an arbitrary direction: threads along it are rare
     here = np.array([0.36, 0.48, 0.80]) - (tangent[:, 0] @ [0.36, 0.48, 0.80])[:, None] * tangent[:, 0]
     side[:, 0] = here = unit(here)
     for k in range(1, curve.shape[1]):
         step = curve[:, k] - curve[:, k - 1]
         here, ahead = _reflected(here, step), _reflected(tangent[:, k - 1], step)
         here = _reflected(here, tangent[:, k] - ahead)
-        # rounding adds up along a thread
+        # remove the rounding that accumulates along a thread
         here = here - (here * tangent[:, k]).sum(-1, keepdims=True) * tangent[:, k]
         side[:, k] = here = unit(here)
     return side
@@ -209,11 +209,11 @@ def _shell_faces(rows: int, columns: int) -> np.ndarray:
 
 def solids(position: np.ndarray, radius: np.ndarray, colour: np.ndarray, kind: np.ndarray | None = None,
            angle: np.ndarray | None = None, detail: int = 32) -> Mesh:
-    """Particles of the plane as solids that lie on it: x, y of the plane, z up out of it.
+    """Particles in 2-D as solid shapes that lie on the plane: x, y in it, z up.
 
     position  (E, 2); radius (E,): of the circle round each; colour (E, 3) sRGB in [0, 1]
     kind      (E,) int, an index into KINDS; beads if none is given
-    angle     (E,) radians, how far each is turned counter-clockwise
+    angle     (E,) radians, its rotation, counter-clockwise
     detail    points round an outline, a multiple of 20
     """
     count = len(position)

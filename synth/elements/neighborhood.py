@@ -153,8 +153,7 @@ def others(positions: np.ndarray, shape: Shape, active: np.ndarray, period: np.n
 
 
 def wrapped(points: np.ndarray, period: np.ndarray | None) -> np.ndarray:
-    """Points (M, D) float64 wrapped into one period of a domain that repeats with `period` (D,), 0 along axes that
-    end."""
+    """Points (M, D) float64 wrapped into one period of a domain; `period` (D,) is 0 along axes that do not repeat."""
     inside = points.astype(np.float64)
     for axis in np.flatnonzero(period) if period is not None else ():
         inside[:, axis] = np.mod(inside[:, axis], period[axis])  # type: ignore[index]

@@ -1,6 +1,7 @@
-"""Local axes R(s): which direction is along, across and up for a sample ("directions, such as left and up, are
-determined
-by user-specified orientation fields", ma13 §3.2)."""
+"""Local axes R(s): which direction is along, across and up for a sample.
+
+"Directions, such as left and up, are determined by user-specified orientation fields" (ma13 §3.2).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Elements and their samples (ma13 §3.1): positions over time, how they hang together, what they look like."""
+"""Elements and their samples (ma13 §3.1): positions over time, topology, appearance."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 TOPOLOGIES = ("none", "thread", "sheet")
-"""How the samples of an element hang together (§3.2): a point alone, a line of them, a grid of them."""
+"""How the samples of an element are connected (§3.2): a single one, a line, a grid."""
 
 
 @dataclass(frozen=True)
@@ -15,15 +15,15 @@ class Elements:
     """E elements of S samples each, over T frames.
 
     positions  (T, E, S, D) float32, D = 2 or 3: p(s), world units
-    grid       how the S samples of an element lie: () one sample, (S,) along a thread, (rows, columns) of a sheet,
+    grid       of the S samples of an element: () one sample, (S,) along a thread, (rows, columns) of a sheet,
                row by row
     rate       frames per second
     size       (E,) float32: radius of a particle or thread, length of a fish, thickness of a sheet, world units
-    kind       (E,) int32: which look or shape an element has
+    kind       (E,) int32: the shape or appearance of an element
     colour     (E, 3) float32, sRGB in 0..1
     coarse     (T, E, S, D) float32 or None: C, where each sample would be without details (§5)
-    box        (2, D) float32 or None: lower and upper corner of the unit that the elements fill, where it repeats
-               toroidally; an element may leave it, its copies come in on the other side
+    box        (2, D) float32 or None: lower and upper corner of the unit that the elements fill, if it repeats
+               toroidally; an element may leave it, its copies enter on the other side
     Raises ValueError for shapes that do not fit, or values that are not finite.
     """
 

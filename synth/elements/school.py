@@ -129,8 +129,7 @@ def mixed(count: int = 44, large: int = 3, frames: int = 60, *, size: float = 3.
     """Fish of two sizes (ma13 figure 9e): `large` of kind 1, and small ones of kind 0, count in all.
 
     size  length of a large fish over that of a small one, from 1 to 5
-    The rest as `homogeneous`; the spacing is that of small fish. Raises ValueError too if not 1 to a quarter of them
-    are large.
+    The rest as `homogeneous`; the spacing is that of small fish. Raises ValueError too unless 1 to a quarter are large.
     """
     _check(count, frames, spacing, speed, rate)
     if not 1 <= large <= count // 4:
@@ -230,9 +229,10 @@ def _confining(offset: np.ndarray, radii: np.ndarray | None) -> np.ndarray:
 
 def _crossed(middle: np.ndarray, leaves: np.ndarray, displacement: np.ndarray, lasts: float, time: float
              ) -> np.ndarray:
-    """Centres of the fish's groups (E, 3), their velocities and accelerations, stacked. From its time in `leaves` (E,)
-    on
-    a fish moves by its displacement (E, 3) with minimum jerk."""
+    """Centres of the fish's groups (E, 3), their velocities and accelerations, stacked.
+
+    From its time in `leaves` (E,) on a fish moves by its displacement (E, 3) with minimum jerk, within `lasts` seconds.
+    """
     s = np.clip((time - leaves) / lasts, 0, 1)[:, None]
     return np.stack([middle + displacement * s**3 * (10 + s * (6 * s - 15)),
                      displacement / lasts * 30 * (s * (1 - s)) ** 2,
@@ -247,9 +247,10 @@ def _wandering(rng: np.random.Generator, count: int) -> Callable[[float], np.nda
 
 
 def _carrying(rng: np.random.Generator, extent: np.ndarray) -> Callable[[np.ndarray, float], np.ndarray]:
-    """Velocities (E, 3), at places (E, 3) and a time, of a flow common to all: four travelling transverse waves, so
-    that
-    it is free of divergence, each with a whole number of wavelengths in the box."""
+    """Velocities (E, 3), at places (E, 3) and a time, of a flow common to all: four travelling transverse waves.
+
+    So it is free of divergence; each has a whole number of wavelengths in the box.
+    """
     number = np.array([[1, 0, 0], [1, 0, 1], [0, 1, 1], [1, 1, -1]]) * rng.choice([-1, 1], (4, 1))
     wave = 2 * np.pi * number / extent
     along = rng.normal(size=(4, 3)) * np.array([0.6, 0.5, 1.0])

@@ -7,6 +7,10 @@ jump as a cause of jitter).
 
 `Searcher.nearest` compares with all of a small exemplar, or with the candidates of k-coherence [Tong et al. 2002]; both
 in OpenCL. `nearest_reference` is the specification of the kernel in NumPy and SciPy.
+
+Hot: the kernel `nearest` takes a quarter (points) to three fifths (threads) of an optimization; 1,000 particles over 60
+frames converge in 17 s on 2 CPU cores. It is bound by arithmetic: a cost matrix and the Hungarian algorithm, cubic in
+the number of neighbours, for each candidate. `python -m bench elements` shows it.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Exemplars by physical simulation (ma13 figures 10b and 13a), by MuJoCo: the only file that knows it.
+"""Exemplars by physical simulation (ma13 figures 10b and 13a), with MuJoCo: the only file that imports it.
 
-    noodles  a bundle of soft rods that is held at one end, shaken and blown at
+    noodles  a bundle of soft rods, held at one end, shaken and in wind
     sheets   sheets of paper that flutter in turbulent air
     lifted   the coarse motion of one noodle that is lifted from a plate (figure 10a)
 
-The models are written here, of numbers alone, in metres, kilograms and seconds, METRES to a world unit. Every run is
-sequential and draws on nothing but its seed: the same seed gives the same bits.
+The models are generated here, in metres, kilograms and seconds, METRES to a world unit. Every run is sequential and
+depends on its seed alone: the same seed gives the same bits.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ GRAVITY = 9.81
 STEPS = 16  # of the simulation in a frame of 24 per second
 LINKS = 20  # capsules of a noodle
 NOODLE = {"density": 1000.0, "stiffness": 0.013, "damping": 1.5e-4, "armature": 1e-6}  # SI; of a joint of 4 cm links
-CURL = 0.30  # radians by which a link of a noodle at rest turns from the one before it
+CURL = 0.30  # angle, radians, between adjacent links of a noodle at rest
 DRAG = 0.006  # kg/s of a link in air
-SKIN = 1.2  # of a simulated noodle's radius over that which is shown: contacts are soft
+SKIN = 1.2  # a simulated noodle's radius over the one rendered: contacts are soft
 PAPER_SPACING = 0.04  # metres from one sample of a sheet to the next
 PAPER = {"density": 0.08, "carried": 0.14, "young": 2e9, "thickness": 1e-4, "damping": 0.02}  # SI; to the square
-# metre; the air that a sheet carries along weighs more than it does
-AIR, PLATE, ALONG = 1.2, 2.0, 0.3  # density; drag of a plate that faces the wind, and of one along it
-BORNE = 0.7  # of a sheet's weight by an updraught: it stays with its gusts
+# metre; the air carried along with a sheet weighs more than the sheet
+AIR, PLATE, ALONG = 1.2, 2.0, 0.3  # density; drag of a plate across the wind, and of one along it
+BORNE = 0.7  # share of a sheet's weight that an updraught carries: it stays among its gusts
 GUST = 1.2  # m/s, rms
 BUNDLE = {"density": 300.0, "bends": 2.2, "damping": 0.06}  # kg/m³; how far, in its radii, its stiffness carries its
 # weight; seconds in which a bend dies away
@@ -48,8 +48,7 @@ def _steps(rate: float, pace: float = 1.0) -> tuple[int, float]:
 
 @contextmanager
 def _watched(what: str) -> Iterator[Any]:
-    """MuJoCo, whose warnings, that a simulation came apart, become a ValueError: left alone they would go into a file.
-    """
+    """MuJoCo, with its warnings, that a simulation diverged, raised as ValueError; by default they go to a file."""
     import mujoco
 
     told: list[str] = []
@@ -74,13 +73,13 @@ def _waves(rng: np.random.Generator, shape: tuple[int, ...], slowest: float, fas
 def noodles(count: int = 14, frames: int = 60, *, samples: int = 40, length: float = 80.0, spacing: float = 1.0,
             radius: float = 0.38, shake: float = 1.0, curl: float = 1.0, rate: float = 24.0,
             seed: int = 0) -> Elements:
-    """A bundle of noodles that hangs along +z from sample 0, is shaken there and blown at (ma13 figure 10b).
+    """A bundle of noodles that hangs along +z from sample 0, where it is shaken, in wind (ma13 figure 10b).
 
     length, spacing, radius  world units; a noodle of 80 is 0.8 m long and swings as slowly
-    shake                    how hard the hand and the air move them, 1: the hand by SHAKE
-    curl                     how curly noodles are at rest, 1: by CURL
-    Noodles are chains of capsules with elastic joints, which touch one another without friction. Positions are those
-    in a frame that is held with them: shaking enters as its acceleration, and samples 0 rest.
+    shake                    strength of hand and wind; 1: the hand by SHAKE
+    curl                     curliness of the noodles at rest; 1: by CURL
+    Noodles are chains of capsules with elastic joints, which touch one another without friction. Positions are
+    relative to the hand: shaking enters as its acceleration, and samples 0 rest.
     `coarse`: straight threads on the bundle's section, spaced as the samples are on average.
     Raises ValueError for other than 2 to 31 noodles, fewer than 4 samples, or noodles that touch at rest.
     """
@@ -106,7 +105,7 @@ def noodles(count: int = 14, frames: int = 60, *, samples: int = 40, length: flo
 
 def _swaying(mujoco: Any, model: Any, count: int, frames: int, rate: float, shake: float,
              rng: np.random.Generator) -> np.ndarray:
-    """Ends of the links (frames, E, LINKS + 1, 3) of chains that are shaken and blown at, metres."""
+    """Ends of the links (frames, E, LINKS + 1, 3) of chains that are shaken in wind, metres."""
     data = mujoco.MjData(model)
     held, gust, own = (_waves(rng, shape, 0.3, fastest) for shape, fastest in (
         ((3,), 1.1), ((2, 3), 0.7), ((count, 3), 1.3)))
@@ -147,7 +146,8 @@ def _dough(rng: np.random.Generator, count: int) -> np.ndarray:
 def _chains(mujoco: Any, places: np.ndarray, length: float, radius: float, rate: float) -> Any:
     """MuJoCo's model of chains of LINKS capsules at places (E, 2), along z; metres.
 
-    Those of different chains touch, for which each has a bit of its own; those of one do not."""
+    Capsules of different chains collide, for which each chain has a bit of its own; those of one chain do not.
+    """
     link, every = length / LINKS, (1 << len(places)) - 1
     step = _steps(rate)[1]
     longer = link / 0.04  # a joint of a longer link stands for more of the rod
@@ -171,14 +171,14 @@ def _chains(mujoco: Any, places: np.ndarray, length: float, radius: float, rate:
 
 
 def _curls(rng: np.random.Generator, count: int, angle: float) -> np.ndarray:
-    """Quaternions (E × LINKS × 4,) by which links at rest turn from the ones before them: two waves along the noodle
-    about each axis across it."""
+    """Quaternions (E × LINKS × 4,) of the links at rest relative to the ones before: two waves along the noodle about
+    each axis across it."""
     link = np.arange(LINKS)
     wave, phase = rng.uniform(4.5, 8, (2, 2, count, 1)), rng.uniform(0, 2 * np.pi, (2, 2, count, 1))
-    turn = angle * np.sin(2 * np.pi * link / wave + phase).sum(0) / np.sqrt(2)
-    turned = np.stack([turn[0], turn[1], np.zeros_like(turn[0])], -1)
-    whole = np.linalg.norm(turned, axis=-1, keepdims=True)
-    return np.concatenate([np.cos(whole / 2), np.sin(whole / 2) * turned / np.maximum(whole, 1e-12)], -1).ravel()
+    angles = angle * np.sin(2 * np.pi * link / wave + phase).sum(0) / np.sqrt(2)
+    vectors = np.stack([angles[0], angles[1], np.zeros_like(angles[0])], -1)
+    whole = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(whole / 2), np.sin(whole / 2) * vectors / np.maximum(whole, 1e-12)], -1).ravel()
 
 
 def _nodes(model: Any, data: Any, count: int) -> np.ndarray:
@@ -196,13 +196,13 @@ def sheets(count: int = 8, frames: int = 60, *, side: int = 7, spacing: float = 
 
     side       samples in a row and in a column of a sheet, 3 to 15 (§6.3: 7 × 7)
     spacing    of the samples, world units: a sheet of 7 × 7 is 24 cm wide; thickness, world units
-    wind       how hard it blows, 1: an rms of GUST
-    stiffness  of the sheet against bending, 1: printing paper
-    pace       seconds that pass for one that is shown, from 0.1 to 1: paper is quick, its edges whip
-    Each sheet falls by itself, pressed on its triangles by the air that goes through them. What it does as a whole, its
-    fall and its tumbling, is the coarse motion's affair and is taken out: in each frame it is turned and moved to fit
-    best on its place, which is flat, rows along +y, columns along +x, beside those of the other sheets.
-    `coarse`: those flat places. Raises ValueError for numbers out of these ranges.
+    wind       its strength; 1: an rms of GUST
+    stiffness  of the sheet in bending; 1: printing paper
+    pace       simulated seconds per second shown, from 0.1 to 1: below 1 is slow motion
+    Each sheet falls by itself, under the pressure of the relative wind on its triangles. Its rigid motion, the fall
+    and the tumbling, belongs to the coarse motion and is removed: in each frame it is rotated and moved to fit best to
+    a flat sheet, rows along +y, columns along +x, beside the other sheets. `coarse`: those flat sheets. Raises
+    ValueError for numbers out of these ranges.
     """
     if not 1 <= count <= 100 or not 3 <= side <= 15:
         raise ValueError(f"1 to 100 sheets of 3 × 3 to 15 × 15 samples are simulated, not {count} of {side} × {side}")
@@ -252,14 +252,14 @@ def _paper(mujoco: Any, side: int, stiffness: float, step: float) -> Any:
 
 
 def _flat(side: int) -> np.ndarray:
-    """Points (side², 3) of a flat sheet, one apart round 0, row by row."""
+    """Points (side², 3) of a flat sheet, at unit spacing, centred on 0, row by row."""
     along = np.arange(side) - (side - 1) / 2
     x, y = np.meshgrid(along, along)
     return np.stack([x, y, np.zeros_like(x)], -1).reshape(-1, 3)
 
 
 def _triangles(side: int) -> np.ndarray:
-    """Triangles (M, 3) of a sheet; their diagonals alternate, or it would bend about one diagonal more easily."""
+    """Triangles (M, 3) of a sheet; diagonals alternate: otherwise it would bend more easily about one of them."""
     row, column = (index.ravel() for index in np.meshgrid(*[np.arange(side - 1)] * 2, indexing="ij"))
     corner = row * side + column
     quad = np.stack([corner, corner + 1, corner + side + 1, corner + side], 1)
@@ -300,8 +300,8 @@ def _fluttering(mujoco: Any, model: Any, side: int, frames: int, steps: int, win
 
 
 def _turbulence(rng: np.random.Generator) -> Callable[[np.ndarray, float], np.ndarray]:
-    """Velocities (P, 3), m/s, at places (P, 3) and a time: waves across their directions, from gusts as large as
-    several sheets to eddies of half a sheet, slower the smaller they are; an rms of GUST."""
+    """Velocities (P, 3), m/s, at places (P, 3) and a time: transverse waves, from gusts as large as several
+    sheets to eddies of half a sheet, the smaller the slower; an rms of GUST."""
     size = np.geomspace(1.2, 0.16, 12)
     direction = rng.normal(size=(12, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -313,8 +313,7 @@ def _turbulence(rng: np.random.Generator) -> Callable[[np.ndarray, float], np.nd
 
 
 def _fitted(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
-    """Points (S, 3) turned and moved, without scaling, to lie as near as they can to those of a flat sheet [Kabsch
-    1976]."""
+    """Points (S, 3) rotated and moved, without scaling, to fit best to those of a flat sheet [Kabsch 1976]."""
     offset = points - points.mean(0)
     left, _, right = np.linalg.svd(offset.T @ flat)
     mirror = np.array([1, 1, np.sign(np.linalg.det(left @ right))])
@@ -325,9 +324,9 @@ def lifted(frames: int = 60, *, samples: int = 40, length: float = 100.0, thick:
            lasts: float = 0.65, rate: float = 24.0, seed: int = 0) -> np.ndarray:
     """The coarse motion of noodles (ma13 §6.2, figure 10a): one curve (frames, samples, 3) float32, world units.
 
-    A bundle lies on a plate at y = 0, y up, bent to an arc about x = z = 0. It is taken at sample 0, lifted, and swings
-    as it hangs, its other end on the plate for as long as it is not too high.
-    thick   radius of the bundle, world units: so high above the plate its middle lies, and so it resists bending
+    A bundle lies on a plate at y = 0, y up, bent to an arc about x = z = 0. It is lifted at sample 0 and swings as it
+    hangs, its other end on the plate until it is lifted too high.
+    thick   radius of the bundle, world units: the height of its middle above the plate; its stiffness depends on it
     height  to which sample 0 is lifted, in lengths, 0 to 1.5; lasts: the share of the clip that the lift lasts
     `bundle.duplicated` gives all noodles its motion. Raises ValueError for numbers out of these ranges, or a bundle
     that is less than ten times as long as its radius.

@@ -6,14 +6,14 @@ files are read elsewhere.
 
     exemplar      circle, square, heart, stripes, sinusoid by procedure
     from_bitmap   the curl of grey values
-    from_drawing  along the strokes of a picture         from_svg   along the paths of a vector drawing
+    from_drawing  along the strokes of an image          from_svg   along the paths of a vector drawing
     from_field    a field made elsewhere                 from_clip  optical flow of a film clip
-    from_volume   a field in space made elsewhere, (N, N, N, 3), for synthesis from 3-D to 3-D
+    from_volume   a 3-D field made elsewhere, (N, N, N, 3), for synthesis from 3-D to 3-D
 
 The procedural kinds are curls of a potential, v = curl ψ = (∂ψ/∂y, -∂ψ/∂x), so their flow lines are the level
 sets of ψ and they have no sources or sinks. The potential of a closed motif is a smooth bump of the shape's
-gauge function ρ (ρ(p) = 1 on the outline, ρ(s p) = s ρ(p)), so the flow runs counter-clockwise round scaled
-copies of the outline and rests outside it.
+gauge function ρ (ρ(p) = 1 on the outline, ρ(s p) = s ρ(p)), so the flow runs counter-clockwise along scaled
+copies of the outline and is zero outside it.
 """
 
 from __future__ import annotations
@@ -123,23 +123,23 @@ KINDS = tuple(_POTENTIALS)
 
 
 def from_bitmap(grey: ArrayLike, size: int, blur: float = 1.0) -> Array:
-    """The curl of a picture's grey values: the flow runs along its edges, bright on the left (ma09 §4).
+    """The curl of an image's grey values: the flow runs along its edges, bright on the left (ma09 §4).
 
     grey: (Y, X), bottom row first, any range. The central square is taken and made toroidal by Moisan's
-    decomposition: the smooth part that carries the jumps across the border is left out, a picture with a
+    decomposition: the smooth part that carries the jumps across the border is left out, an image with a
     plain border stays as it is. It is then resampled and differentiated in Fourier space, smoothed by a
-    Gaussian of standard deviation `blur`, in cells of the exemplar or of the picture, whichever are larger.
+    Gaussian of standard deviation `blur`, in cells of the exemplar or of the image, whichever are larger.
 
-    Returns (size, size, 2) float32, no sources. Raises ValueError for a blank, non-finite or tiny picture.
+    Returns (size, size, 2) float32, no sources. Raises ValueError for a blank, non-finite or tiny image.
     """
     _check_size(size)
-    picture = _square_crop(_checked(grey, 2, "the bitmap"))
-    span = np.ptp(picture)
+    image = _square_crop(_checked(grey, 2, "the bitmap"))
+    span = np.ptp(image)
     if span == 0:
         raise ValueError("the bitmap is blank: all its grey values are the same")
     if not 0 <= blur <= size / 4:
         raise ValueError(f"blur = {blur} is not between 0 and a quarter of the exemplar's {size} cells")
-    return _unit(_fourier_curl(_periodic(picture / span), size, blur))
+    return _unit(_fourier_curl(_periodic(image / span), size, blur))
 
 
 def _fourier_curl(psi: Floats, size: int, blur: float) -> Floats:
@@ -203,7 +203,7 @@ def from_field(values: ArrayLike, size: int, toroidal: bool = False) -> Array:
 
 
 def from_volume(values: ArrayLike, size: int, toroidal: bool = False) -> Array:
-    """A field in space made elsewhere: its central cube, resampled (linear; means of volume when smaller).
+    """A 3-D field made elsewhere: its central cube, resampled (linear; means of volume when smaller).
 
     values: (Z, Y, X, 3), components x, y, z, any unit; `toroidal` as in `from_field`.
 
@@ -239,7 +239,7 @@ def _resampling(side: int, size: int) -> Floats:
 def from_clip(frames: Iterable[ArrayLike], size: int) -> Array:
     """The mean optical flow of a clip, made toroidal (ma09 §1, "captured data").
 
-    frames: grey pictures (Y, X) of one size, bottom row first, uint8 or float from 0 to 1, two or more.
+    frames: grey images (Y, X) of one size, bottom row first, uint8 or float from 0 to 1, two or more.
     The flow between neighbours is OpenCV's dense inverse search (Kroeger 2016).
 
     Returns (size, size, 2) float32. Raises ValueError for fewer than two frames, frames of different or too
@@ -263,19 +263,19 @@ def from_clip(frames: Iterable[ArrayLike], size: int) -> Array:
     return from_field(total, size, toroidal=True)
 
 
-def from_drawing(picture: ArrayLike, size: int) -> Array:
+def from_drawing(image: ArrayLike, size: int) -> Array:
     """A hand drawing: the flow runs along its strokes and dies away beside them (ma09 §1, "manual art").
 
-    picture: (Y, X), (Y, X, 3) or (Y, X, 4), bottom row first, uint8 or float from 0 to 1. The paper is its
+    image: (Y, X), (Y, X, 3) or (Y, X, 4), bottom row first, uint8 or float from 0 to 1. The paper is its
     median tone, ink what differs from it by a quarter of the range. The strokes are thinned to lines
     and followed, straight on through crossings. An open stroke starts at its red dot; without one it runs
     to the right, or upwards if it is more upright than level. A closed stroke runs counter-clockwise.
-    A picture that is not square is widened with paper.
+    A image that is not square is widened with paper.
 
-    Returns (size, size, 2) float32. Raises ValueError for a picture without strokes, non-finite or tiny.
+    Returns (size, size, 2) float32. Raises ValueError for an image without strokes, non-finite or tiny.
     """
     _check_size(size)
-    tones = _tones(picture)
+    tones = _tones(image)
     tones = _checked(tones[..., None] if tones.ndim == 2 else tones, 3, "the drawing")
     lines, half_width = strokes.traced(*strokes.ink(tones))
     if not lines:
@@ -287,7 +287,7 @@ def from_svg(text: str, size: int) -> Array:
     """A vector drawing: the flow runs along its paths, in the direction in which each was drawn (ma09 §1).
 
     text: the SVG document. Paths, lines, polylines, polygons, rectangles, circles and ellipses count,
-    transforms are applied; styles, text and pictures are ignored and nothing it refers to is opened. The
+    transforms are applied; styles, text and images are ignored and no reference is opened. The
     viewBox is fitted into the tile, or the drawing with a margin where there is none.
 
     Returns (size, size, 2) float32. Raises ValueError for a document that is not SVG, has a document type
@@ -297,9 +297,9 @@ def from_svg(text: str, size: int) -> Array:
     return _unit(strokes.flow_along(strokes.svg_strokes(text), size, strokes.STROKE_REACH))
 
 
-def _tones(picture: ArrayLike) -> Floats:
-    """Integer pictures to 0 … 1, others as they are; float64."""
-    array = np.asarray(picture)
+def _tones(image: ArrayLike) -> Floats:
+    """Integer images to 0 … 1, others as they are; float64."""
+    array = np.asarray(image)
     top = np.iinfo(array.dtype).max if np.issubdtype(array.dtype, np.integer) else 1
     return array.astype(np.float64) / top
 

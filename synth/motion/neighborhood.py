@@ -158,8 +158,7 @@ def space_of(patches: np.ndarray, radius: int, scatter: np.ndarray | None = None
     """Principal components of neighbourhoods (E, C) of a radius, ordered by variance.
 
     Keeps as many as hold 99.5 % of the variance, 64 at most; scatter (C, C), X^T X of them without their mean, where
-    it is known. One thread of BLAS: its sums, and with them the basis, would otherwise depend on the number of
-    threads.
+    it is known. One thread of BLAS: the sums, and with them the basis, would otherwise depend on their number.
     """
     mean = patches.mean(axis=0, dtype=np.float64).astype(np.float32)
     centred = patches - mean

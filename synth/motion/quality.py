@@ -1,4 +1,4 @@
-"""How good a synthesized detail field is: five numbers, none of which a blurred or empty field can reach; whole motifs.
+"""The quality of a synthesized detail field: five numbers that detect blur and emptiness, and whole motifs.
 
 All on H before the coordinate transformation, neighbourhoods oriented as in the search (ma09 §3.3), the exemplar
 toroidal. Distances are rms over the neighbourhood, divided by the rms of the exemplar.

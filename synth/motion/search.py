@@ -2,6 +2,10 @@
 
 Exact search compares with every neighbourhood that a bound cannot exclude; k-coherence only with those that the
 neighbouring sites suggest.
+
+Hot: `exact` takes about a third of a 2-D frame (0.18 s for a later frame of 256² from a 64² exemplar, on 2 CPU cores).
+It is bound by arithmetic, since each load of the exemplar serves QUERIES_TOGETHER queries. `python -m bench synthesis`
+times the frame, `python -m bench search` the kernel alone.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A stroke is a directed polyline, (n, 2) float64 points x, y; in the unit tile, y upwards, unless said otherwise.
 
-    ink           where a picture has ink          svg_strokes   the paths of an SVG document
+    ink           where an image has ink          svg_strokes   the paths of an SVG document
     traced        the strokes of that ink          svg_outlines  its closed paths, as contours of obstacles
     flow_along    the field that follows strokes
 """
@@ -118,9 +118,9 @@ def _bounds(strokes: Sequence[Floats]) -> tuple[Floats, Floats]:
 
 
 def ink(tones: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Where a picture (Y, X, channels), tones 0 to 1, has ink, and where that is red: both (S, S), square paper.
+    """Where an image (Y, X, channels), tones 0 to 1, has ink, and where that is red: both (S, S), square paper.
 
-    The paper is the median tone; a picture that is not square is centred on more paper. Raises ValueError for a number
+    The paper is the median tone; an image that is not square is centred on more paper. Raises ValueError for a number
     of channels other than 1, 3 or 4.
     """
     cv2 = opencv()
@@ -183,7 +183,7 @@ def _runs_backwards(points: Floats, closed: bool, dots: Floats, near: float) -> 
 
 
 def _walks(thin: NDArray[np.bool_], gap: float) -> list[list[tuple[int, int]]]:
-    """The lines of a thinned picture as chains of (y, x) pixels: from free ends first, then the loops.
+    """The lines of a thinned image as chains of (y, x) pixels: from free ends first, then the loops.
 
     At a junction the walk goes the straightest way; it crosses up to `gap` pixels that another walk has
     taken, so that two strokes that cross stay two strokes.

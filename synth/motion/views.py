@@ -5,6 +5,10 @@ only the components in that plane (Eq. 2, figure 3).
 
     I_i  exemplar of view i     P_i  its projection, the rows right and up      w_i  its weight
     mu   match of a site        R    local axes                                 M_i  what its match makes of a voxel
+
+Hot: the kernels `gather`, `average` and `nearest` take about three fifths of a later frame in 3-D (9.4 s for 256²×64
+voxels, on 2 CPU cores). They are bound by scattered reads along the local axes: of the field in `gather`, of the
+exemplar in the others. `python -m bench solid` shows it.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""Density: the exact identities of pseudocode 3 and 4, one step at a time against the NumPy reference,
-sources."""
+"""Density: the exact identities of pseudocode 3 and 4, one step at a time against the NumPy reference, sources."""
 
 import hashlib
 import itertools

@@ -208,5 +208,5 @@ def test_the_same_seed_gives_the_same_bits_and_a_kept_state_goes_on_alike():
 
 
 def test_k_coherence_is_refused():
-    with pytest.raises(ValueError, match="search exactly"):
+    with pytest.raises(ValueError, match="no fixed neighbours"):
         Synthesis(exemplar("heart", 16), (40, 40), Settings(2, search="k-coherence"), 1)
