@@ -42,7 +42,7 @@ def curl_noise(shape: tuple[int, ...], frames: int, *, seed: int, octaves: int =
     octaves  number of octaves; each has half the size and `gain` times the speed of the one before
     length   size of the largest features, world units (the domain is 1 high)
     speed    rms speed of the first frame, cells per frame
-    period   frames in which the largest features turn over; an octave's period is as `length`'s, halved
+    period   frames in which the largest features change completely; it halves with each octave, as the size does
     Yields (*shape, D) float32, cells per frame. The curl is of central differences, so the divergence by
     central differences (`projection.divergence`) vanishes to rounding everywhere but in the outermost cells.
     """

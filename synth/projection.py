@@ -210,7 +210,7 @@ def _pressure(source: np.ndarray, border: str, unseen_as: float = 0.0) -> np.nda
     else:
         spectrum = fft.dstn(source, type=2, axes=axes)
         angles = [np.pi * np.arange(1, n + 1) / n for n in source.shape]
-    # differencing twice multiplies a mode that turns by `angle` from cell to cell by -sin(angle)^2
+    # differencing twice multiplies a mode whose phase changes by `angle` from cell to cell by -sin(angle)^2
     eigenvalue = np.zeros(source.shape)
     for axis, angle in enumerate(angles):
         eigenvalue -= (np.sin(angle) ** 2).reshape([-1 if a == axis else 1 for a in axes])

@@ -28,7 +28,7 @@ def simulate(shape: tuple[int, ...], frames: int, *, seed: int, radius: float = 
     cooling      share of the temperature lost in a frame
     sway         sideways acceleration of the hot smoke by seeded gusts, in buoyancies: without, a plume rises
                  dead straight and mirror-symmetric
-    sway_period  frames in which the gusts turn
+    sway_period  frames in which the gusts change direction
     warmup       frames to simulate before the first
     Yields per frame (velocity (*shape, D) float32 in cells per frame, density (*shape) float32 in [0, 1]).
     The velocity's `projection.divergence` is zero to rounding, and so is the flow through the walls.

@@ -68,11 +68,11 @@ def wake(shape: tuple[int, ...], frames: int, *, seed: int, centre: tuple[float,
 
     centre, radius  of the disc, world units
     flow            speed of the river along x, heights per unit of time
-    influence       distance from the disc within which it gives way, world units
+    influence       distance from the disc within which the flow is deflected, world units
     expansion       how much the wake widens, to each side, per height downstream
     lengths, gains  of the octaves of noise: size of their features (world units), amplitude of their potential
     step            units of time in a frame
-    period          frames in which the noise turns over
+    period          frames in which the noise changes completely
     Yields (Y, X, 2) float32, cells per frame. Raises ValueError for another dimension, or for numbers of lengths and
     gains that differ.
     """

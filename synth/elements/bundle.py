@@ -21,7 +21,7 @@ def section(count: int, spacing: float) -> np.ndarray:
 
 
 def straight(places: np.ndarray, samples: int, length: float) -> np.ndarray:
-    """Straight threads (E, samples, 3) along +z from places (E, 2), samples equally far apart."""
+    """Straight threads (E, samples, 3) along +z from places (E, 2), samples at equal distances."""
     z = np.broadcast_to(np.linspace(0, length, samples)[None, :, None], (len(places), samples, 1))
     return np.concatenate([np.broadcast_to(places[:, None], (len(places), samples, 2)), z], -1)
 
@@ -31,7 +31,7 @@ def duplicated(curve: np.ndarray, count: int, spacing: float = 1.0, radius: floa
     """One thread's motion given to all of a bundle (ma13 §6.2: "simply duplicate the motion to all the other output
     noodles to get the coarse control").
 
-    curve    (T, S, 3), S ≥ 3, world units; its samples are equally far apart
+    curve    (T, S, 3), S ≥ 3, world units; its samples are at equal distances
     spacing  of the threads in the bundle's section, radius of a thread, world units
     The section is carried along the curve with the least rotation, so that threads neither cross nor spread where the
     curve bends, while its radius of curvature exceeds the bundle's thickness; in sharper bends they are drawn together,

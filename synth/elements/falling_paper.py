@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from synth.elements.samples import Elements
 
-STEPS = 4  # in a frame of 24 per second
+STEPS = 4  # simulation steps per frame at 24 frames per second
 REACH = 1.15  # distance that scraps keep from one another, in their widths
 RESPONSE = 0.22  # seconds in which a scrap takes on the wind's velocity
 FALL = 1.6  # widths per second that a scrap sinks in still air

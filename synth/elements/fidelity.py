@@ -1,7 +1,7 @@
 """Statistics by which an output is compared with its exemplar: pair correlation, motion spectrum, nearest distance, and
 jitter (ma13 §4.2).
 
-All take positions (T, E, S, D), world units, and look at whole elements by the middle of their samples.
+All take positions (T, E, S, D), world units, and treat an element as the mean of its samples.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def statistics(positions: np.ndarray, spacing: float, period: np.ndarray | None 
     """
     points = positions.mean(axis=2).astype(np.float64)
     reach = REACH * spacing
-    counts, asked, nearest, density = np.zeros(BINS), 0, [], []
+    counts, measured, nearest, density = np.zeros(BINS), 0, [], []
     for t in np.unique(np.linspace(0, len(points) - 1, FRAMES).astype(int)):
         now = wrapped(points[t], period)
         tree = cKDTree(_repeated(now, period, reach))
@@ -61,14 +61,14 @@ def statistics(positions: np.ndarray, spacing: float, period: np.ndarray | None 
         distances = pairs.data[pairs.data > 0]
         counts += np.histogram(distances, bins=BINS, range=(0, reach))[0]
         density.append(len(distances) / len(inner))
-        asked += len(inner)
-    if not asked:
+        measured += len(inner)
+    if not measured:
         raise ValueError("no element lies deep enough in the domain to be measured")
     edges = np.linspace(0, reach, BINS + 1)
     counts = ndimage.gaussian_filter1d(counts, SMOOTH, mode="nearest")
     shell = np.diff(edges ** points.shape[2])
     # normalized by the number within REACH: density is compared separately
-    correlation = counts / asked / shell * reach ** points.shape[2] / max(float(np.mean(density)), 1e-9)
+    correlation = counts / measured / shell * reach ** points.shape[2] / max(float(np.mean(density)), 1e-9)
     return Statistics(correlation, spectrum(positions if carried is None else positions - carried),
                       float(np.mean(np.concatenate(nearest))))
 

@@ -80,8 +80,8 @@ def folded(count: int = 9, frames: int = 60, *, side: int = 7, spacing: float = 
         number = np.minimum((along * parts).astype(int), parts - 1)
         return np.radians(angle) * closed * (1 - 2 * (number % 2))
 
-    turns = np.where(np.arange(max(count, 0)) // 3 % 2 == 0, 0.0, np.pi / 2)
-    return _sheets(count, frames, side, spacing, thickness, rate, turns, lean, rng)
+    directions = np.where(np.arange(max(count, 0)) // 3 % 2 == 0, 0.0, np.pi / 2)
+    return _sheets(count, frames, side, spacing, thickness, rate, directions, lean, rng)
 
 
 def fluttering(count: int = 9, frames: int = 60, *, side: int = 7, spacing: float = 1.0, thickness: float = 0.02,
@@ -96,13 +96,13 @@ def fluttering(count: int = 9, frames: int = 60, *, side: int = 7, spacing: floa
         raise ValueError(f"angle = {angle:g} is not between 5 and 80 degrees, or waves = {waves:g} not 0.25 to 2")
     rng = np.random.Generator(np.random.Philox(key=seed))
     phase = rng.uniform(0, 2 * np.pi, max(count, 0))
-    turns = rng.uniform(0, 2 * np.pi, max(count, 0))
+    directions = rng.uniform(0, 2 * np.pi, max(count, 0))
 
     def lean(sheet: int, along: np.ndarray, time: float) -> np.ndarray:
         swing = 0.75 + 0.25 * np.sin(time + phase[sheet] * 3)
         return np.radians(angle) * swing * np.sin(2 * np.pi * waves * along - time + phase[sheet])
 
-    return _sheets(count, frames, side, spacing, thickness, rate, turns, lean, rng)
+    return _sheets(count, frames, side, spacing, thickness, rate, directions, lean, rng)
 
 
 def _check(count: int, frames: int, rate: float) -> None:
@@ -111,12 +111,12 @@ def _check(count: int, frames: int, rate: float) -> None:
                          f"not {count}, {frames} and {rate}")
 
 
-def _sheets(count: int, frames: int, side: int, spacing: float, thickness: float, rate: float, turns: np.ndarray,
+def _sheets(count: int, frames: int, side: int, spacing: float, thickness: float, rate: float, directions: np.ndarray,
             lean: Callable[[int, np.ndarray, float], np.ndarray], rng: np.random.Generator) -> Elements:
     """Sheets bent as parts of cylinders, each across its own direction.
 
-    turns  (E,) radians from +x to the direction along which a sheet's profile changes
-    lean   slope of a sheet's profile, radians, at positions from 0 to 1 along it, at a time from 0 to 2π
+    directions  (E,) radians from +x to the direction along which a sheet's profile changes
+    lean        slope of a sheet's profile, radians, at positions from 0 to 1 along it, at a time from 0 to 2π
     """
     _check(count, frames, rate)
     if side < 3 or not (spacing > 0 and thickness > 0):
@@ -126,10 +126,11 @@ def _sheets(count: int, frames: int, side: int, spacing: float, thickness: float
     x, y = (axis.ravel() for axis in np.meshgrid(across, across))
     columns = int(np.ceil(np.sqrt(count)))
     coarse, bent = np.empty((frames, count, side * side, 3)), np.empty((frames, count, side * side, 3))
-    for sheet, turn in enumerate(turns):
+    for sheet, direction in enumerate(directions):
         place = np.array([sheet % columns, sheet // columns, 0]) * (side + 1.0)
         coarse[:, sheet] = np.stack([x, y, np.zeros_like(x)], -1) + place
-        ahead, aside = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
+        c, s = np.cos(direction), np.sin(direction)
+        ahead, aside = x * c + y * s, y * c - x * s
         half = np.abs(ahead).max()
         steps = int(np.ceil(2 * half * FINE / 6)) * 6  # creases at halves, thirds and sixths fall between steps
         at = np.linspace(-half, half, steps + 1)
@@ -138,8 +139,8 @@ def _sheets(count: int, frames: int, side: int, spacing: float, thickness: float
             profile = np.stack([np.cos(rise), np.sin(rise)]).cumsum(1) * (2 * half / steps)
             along, up = (np.interp(ahead, at, np.concatenate([[0.0], axis])) for axis in profile)
             along -= along.mean()
-            bent[frame, sheet] = place + np.stack([along * np.cos(turn) - aside * np.sin(turn),
-                                                   along * np.sin(turn) + aside * np.cos(turn), up - up.mean()], -1)
+            bent[frame, sheet] = place + np.stack([along * c - aside * s,
+                                                   along * s + aside * c, up - up.mean()], -1)
     colour = np.clip(0.93 * np.exp(rng.normal(0, 0.03, (count, 1))) * [1.0, 0.99, 0.96], 0, 1)
     return Elements((bent * spacing).astype(np.float32), (side, side), rate, size=np.full(count, thickness),
                     colour=colour, coarse=coarse * spacing)

@@ -100,10 +100,10 @@ def tubes(positions: np.ndarray, radius: np.ndarray, colour: np.ndarray, sides: 
     station = np.concatenate([np.zeros(rings, int), np.arange(last + 1), np.full(rings, last)])
     ahead = np.concatenate([-np.sin(bow), np.zeros(last + 1), np.sin(bow)[::-1]])
     wide = np.concatenate([np.cos(bow), np.ones(last + 1), np.cos(bow)[::-1]])
-    turn = 2 * np.pi * np.arange(sides) / sides
+    around = 2 * np.pi * np.arange(sides) / sides
     r = np.asarray(radius, float)[:, None, None]
     centre = curve[:, station] + r * ahead[:, None] * tangent[:, station]
-    spoke = (np.cos(turn)[:, None] * side[:, station, None] + np.sin(turn)[:, None] * up[:, station, None])
+    spoke = (np.cos(around)[:, None] * side[:, station, None] + np.sin(around)[:, None] * up[:, station, None])
     ring = centre[:, :, None] + (r * wide[:, None])[..., None] * spoke
     poles = curve[:, [0, last]] + r * np.array([[-1.0], [1.0]]) * tangent[:, [0, last]]
     vertices = np.concatenate([ring.reshape(count, -1, 3), poles], 1)
@@ -226,10 +226,10 @@ def solids(position: np.ndarray, radius: np.ndarray, colour: np.ndarray, kind: n
         who = np.flatnonzero(kind == k)
         points, faces = _solid(int(k), detail)
         c, s = np.cos(angle[who])[:, None], np.sin(angle[who])[:, None]
-        turned = np.stack([c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1],
+        rotated = np.stack([c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1],
                            np.broadcast_to(points[:, 2], (len(who), len(points)))], -1)
         place = np.column_stack([np.asarray(position, float)[who], np.zeros(len(who))])
-        mesh = assembled(place[:, None] + np.asarray(radius, float)[who, None, None] * turned, faces,
+        mesh = assembled(place[:, None] + np.asarray(radius, float)[who, None, None] * rotated, faces,
                           np.asarray(colour, float)[who])
         parts.append(Mesh(mesh.vertices, mesh.faces, mesh.colours, who[mesh.element].astype(np.int32)))
     return joined(parts)
@@ -248,13 +248,13 @@ def joined(parts: list[Mesh]) -> Mesh:
 @functools.cache
 def _solid(kind: int, detail: int) -> tuple[np.ndarray, np.ndarray]:
     """A solid of radius 1 on the plane z = 0: points (V, 3) and faces (M, 3)."""
-    turn = 2 * np.pi * np.arange(detail) / detail
-    reach = {"bead": np.ones(detail), "disc": np.ones(detail), "star": 0.74 + 0.26 * np.cos(5 * turn),
+    around = 2 * np.pi * np.arange(detail) / detail
+    reach = {"bead": np.ones(detail), "disc": np.ones(detail), "star": 0.74 + 0.26 * np.cos(5 * around),
              "leaf": np.ones(detail)}[KINDS[kind]]
-    outline = np.stack([reach * np.cos(turn), reach * np.sin(turn)], 1)
+    outline = np.stack([reach * np.cos(around), reach * np.sin(around)], 1)
     if KINDS[kind] == "leaf":
         # pointed at both ends
-        outline = np.stack([np.cos(turn), 0.46 * np.sign(np.sin(turn)) * np.abs(np.sin(turn)) ** 1.5], 1)
+        outline = np.stack([np.cos(around), 0.46 * np.sign(np.sin(around)) * np.abs(np.sin(around)) ** 1.5], 1)
     profile = DOME if KINDS[kind] == "bead" else TILE
     ring = np.concatenate([np.column_stack([wide * outline, np.full(detail, high)]) for wide, high in profile])
     poles = np.array([[0.0, 0.0, profile[0, 1]], [0.0, 0.0, profile[-1, 1] + (0.006 if KINDS[kind] == "bead" else 0)]])

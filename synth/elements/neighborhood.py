@@ -168,8 +168,8 @@ def _tree(points: np.ndarray, period: np.ndarray | None) -> cKDTree:
 
 def _nearest_others(tree: cKDTree, centre: np.ndarray, radius: float, most: int, samples: int, size: int) -> np.ndarray:
     """The nearest sample of each of the `most` nearest other elements within the radius, (size, most), -1 for none."""
-    asked = min(size, (most + 1) * (1 if samples == 1 else min(samples, 6)) + 1)
-    distance, index = tree.query(centre, k=asked, distance_upper_bound=radius)
+    queried = min(size, (most + 1) * (1 if samples == 1 else min(samples, 6)) + 1)
+    distance, index = tree.query(centre, k=queried, distance_upper_bound=radius)
     distance, index = distance.reshape(size, -1), index.reshape(size, -1)
     own = np.arange(size) // samples
     good = np.isfinite(distance) & (index // samples != own[:, None])

@@ -72,9 +72,9 @@ def _carried(across: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.nd
     """`across`, orthogonal to `before`, after the smallest rotation that takes `before` to `after`."""
     axis = np.cross(before, after)
     cosine = _dot(before, after)
-    turned = (across * cosine + np.cross(axis, across)
+    rotated = (across * cosine + np.cross(axis, across)
               + axis * _dot(axis, across) / np.maximum(1.0 + cosine, 1e-6))
-    return _unit(turned - _dot(turned, after) * after)
+    return _unit(rotated - _dot(rotated, after) * after)
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -175,7 +175,7 @@ float distance_to(const Neighborhood *o, int in, float limit, int *partner, __gl
 }
 
 // One output sample: its N nearest of all the exemplar (C = 0) or of its candidates.
-__kernel void nearest(__global const int *samples,        // (M) output samples that are asked for
+__kernel void nearest(__global const int *samples,        // (M) output samples to match
                       __global const float *position,     // (all, D)
                       __global const float *detail,       // (all, D)
                       __global const float *axes,         // (all, D, D), or one number if there are none

@@ -22,7 +22,7 @@ from synth.elements.samples import Elements
 
 METRES = 0.01  # of a world unit
 GRAVITY = 9.81
-STEPS = 16  # of the simulation in a frame of 24 per second
+STEPS = 16  # simulation steps per frame at 24 frames per second
 LINKS = 20  # capsules of a noodle
 NOODLE = {"density": 1000.0, "stiffness": 0.013, "damping": 1.5e-4, "armature": 1e-6}  # SI; of a joint of 4 cm links
 CURL = 0.30  # angle, radians, between adjacent links of a noodle at rest

@@ -20,7 +20,7 @@ from synth.elements.search import Exemplar, Matches, Output, Searcher
 Flow = Callable[[int, np.ndarray], np.ndarray]
 """The displacement (M, D), world units, of points (M, D) from frame t (from 0) to the next."""
 
-Turn = Callable[[int, np.ndarray], np.ndarray]
+Rotation = Callable[[int, np.ndarray], np.ndarray]
 """Local axes (M, D, D) at points (M, D) in frame t."""
 
 SAME = 1e-6  # energy per sample, in squared radii of the neighbourhood, below which the output equals the exemplar
@@ -57,17 +57,17 @@ class Settings:
 class Controls:
     """User controls of an output (§4.1): constraints, a global flow, an orientation field, maps.
 
-    flow     None: there is no flow
-    turn     the local axes at points; None: `axes`
-    axes     (T·E·S, D, D) local axes of elements with a coarse motion; None: those of the domain
-    control  the control map's value (M,) at points (M, D) of frame t
-    allowed  bits (M,) of the kinds allowed there
-    period   (D,) of a toroidal output, 0 along axes that end
+    flow      None: there is no flow
+    rotation  the local axes at points; None: `axes`
+    axes      (T·E·S, D, D) local axes of elements with a coarse motion; None: those of the domain
+    control   the control map's value (M,) at points (M, D) of frame t
+    allowed   bits (M,) of the kinds allowed there
+    period    (D,) of a toroidal output, 0 along axes that end
     """
 
     constraints: Constraints = field(default_factory=Constraints)
     flow: Flow | None = None
-    turn: Turn | None = None
+    rotation: Rotation | None = None
     axes: np.ndarray | None = None
     control: Callable[[int, np.ndarray], np.ndarray] | None = None
     allowed: Callable[[int, np.ndarray], np.ndarray] | None = None
@@ -149,9 +149,9 @@ class Optimizer:
         axes, control, allowed = controls.axes, np.zeros(len(flat), np.float32), np.full(len(flat), -1, np.int32)
         for t in active:
             part = slice(t * self.size, (t + 1) * self.size)
-            if controls.turn is not None:
+            if controls.rotation is not None:
                 axes = np.zeros((len(flat), dims, dims), np.float32) if axes is None or t == active[0] else axes
-                axes[part] = controls.turn(int(t), flat[part])
+                axes[part] = controls.rotation(int(t), flat[part])
             if controls.control is not None:
                 control[part] = controls.control(int(t), flat[part])
             if controls.allowed is not None:
@@ -305,8 +305,8 @@ def _advected(optimizer: Optimizer, frame: int) -> None:
     many = example.count * example.positions.shape[2]
     following = np.where(match + many < example.frames * many, match + many, match)
     moved = optimizer.exemplar.detail[following] - optimizer.exemplar.detail[match]
-    if optimizer.controls.turn is not None:
-        moved = np.einsum("nij,nj->ni", optimizer.controls.turn(frame - 1, before), moved)
+    if optimizer.controls.rotation is not None:
+        moved = np.einsum("nij,nj->ni", optimizer.controls.rotation(frame - 1, before), moved)
     optimizer.positions[frame] = (before + step + moved).reshape(optimizer.positions[frame].shape)
     optimizer.matches.sample[frame * size: (frame + 1) * size] = np.stack(
         [following, *optimizer.matches.sample[(frame - 1) * size: frame * size, 1:].T], axis=-1)

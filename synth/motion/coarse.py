@@ -20,7 +20,7 @@ def coarse(kind: str, shape: tuple[int, ...], frames: int, seed: int = 0,
          "curl-noise"  a random divergence-free flow; settings as `synth.noise.curl_noise`
          "wake"        a river past a round stone; settings as `synth.wake.wake`
          "analytic"    a steady flow; settings: flow (a key of FLOWS), speed (largest, cells per frame),
-                       angle (degrees, turns the whole pattern)
+                       angle (degrees, rotates the whole pattern)
     Yields (*shape, D) float32, cells per frame. Raises ValueError for an unknown kind or setting, at once.
     """
     if kind not in KINDS:

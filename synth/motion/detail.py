@@ -159,7 +159,7 @@ class Synthesis:
         """L (Y, X, 2) and its local axes on each level, coarsest first, continued over the margin."""
         motions = [motion / np.float32(2 ** (len(self.levels) - 1 - i))
                    for i, motion in enumerate(pyramid.pyramid(L, len(self.levels), toroidal=False))]
-        # before the margins: these are the axes that turn H into H' afterwards
+        # before the margins: these are the axes that rotate H into H' afterwards
         axes = [_margin(axes_2d(motion, self.along)) for motion in motions]
         return [_margin(motion) for motion in motions], axes
 

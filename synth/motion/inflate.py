@@ -1,7 +1,7 @@
 """A volume from 2-D smoke, so that a 2-D result can be rendered as a true volume.
 
 Carried straight through a volume by (F_x, F_y, 0), smoke keeps its pattern in every layer; only its depth is free.
-With one depth for all it looks cut out of a board, and a body of revolution hides each motif behind the smoke in front
+With one depth for all it seems cut out of a board, and a body of revolution hides each motif behind the smoke in front
 of it. Here each part is about as deep as it is wide: a filament becomes a round thread, a cloud a rounded body, and
 the pattern is still visible from the front.
 """

@@ -149,7 +149,7 @@ def blocks(axes: np.ndarray, edges: tuple[int, int, int], random: np.random.Gene
 
 def _block_owners(cells: np.ndarray, centres: np.ndarray, axes: np.ndarray,
                   half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For each of cells (P, 3) the centre whose turned block holds it best, and the offset along that block's axes."""
+    """For each of cells (P, 3) the centre whose rotated block holds it best, and the offset along that block's axes."""
     _, index = cKDTree(centres).query(cells, k=min(NEAREST_BLOCKS, len(centres)))
     index = index.reshape(len(cells), -1)
     x, y, z = np.rint(centres).astype(int).T

@@ -1,6 +1,6 @@
 """Strokes: the lines of a hand drawing or a vector drawing, and the flow along them (ma09 §1, "manual art").
 
-A stroke is a directed polyline, (n, 2) float64 points x, y; in the unit tile, y upwards, unless said otherwise.
+A stroke is a directed polyline, (n, 2) float64 points x, y; in the unit tile, y upwards, unless stated otherwise.
 
     ink           where an image has ink          svg_strokes   the paths of an SVG document
     traced        the strokes of that ink          svg_outlines  its closed paths, as contours of obstacles
@@ -185,7 +185,7 @@ def _runs_backwards(points: Floats, closed: bool, dots: Floats, near: float) -> 
 def _walks(thin: NDArray[np.bool_], gap: float) -> list[list[tuple[int, int]]]:
     """The lines of a thinned image as chains of (y, x) pixels: from free ends first, then the loops.
 
-    At a junction the walk goes the straightest way; it crosses up to `gap` pixels that another walk has
+    At a junction the walk takes the straightest branch; it crosses up to `gap` pixels that another walk has
     taken, so that two strokes that cross stay two strokes.
     """
     left = {(int(y), int(x)) for y, x in np.argwhere(thin)}

@@ -375,6 +375,6 @@ def _among_eight(offset: np.ndarray, site: np.ndarray, sites: np.ndarray, step: 
     first, last = sites.min(0), sites.max(0)
     near = np.abs(offset) < step
     beyond = ((site == first) & (offset <= 0)) | ((site == last) & (offset >= 0))
-    # a cell on a plane of sites looks forward too
+    # a cell on a plane of sites counts for the cube in front of it too
     behind = (offset == -step) & (site > first)
     return np.all(near | beyond | behind, axis=-1)

@@ -1,4 +1,4 @@
-"""Initialization: as many elements as there should be, whole, where they may be, moving as those they copy."""
+"""Initialization: the count, whole elements, inside the domain, moving as those they copy."""
 
 import numpy as np
 import pytest
@@ -89,7 +89,7 @@ def test_threads_take_the_details_of_whole_threads_in_their_own_frames() -> None
 
 
 def test_a_control_map_chooses_the_patches() -> None:
-    """An exemplar of small elements on its left and large ones on its right, and a map that asks for the contrary."""
+    """An exemplar of small elements on its left and large ones on its right, and a map that requires the opposite."""
     points = arrangement.poisson_disk((12, 12), seed=5)
     large = points.positions[0, :, 0, 0] > 6
     exemplar = Elements(points.positions, size=1.0 + large, box=points.box)

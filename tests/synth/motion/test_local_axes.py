@@ -1,4 +1,4 @@
-"""Local frames: unit vectors along L, one fallback where it rests, and the coordinate transformation of figure 2."""
+"""Local axes: unit vectors along L, one fallback where it rests, and the coordinate transformation of figure 2."""
 
 import numpy as np
 import pytest
@@ -201,7 +201,7 @@ def test_a_swirl_with_an_updraught_has_no_seam():
 def test_a_plumes_frames_turn_little_between_voxels_and_between_frames():
     """24 x 32 x 24 on twice as many cells, 20 frames.
 
-    The frame must turn over at points where L comes to rest and on lines round which the second direction winds; how
+    The axes must flip at points where L comes to rest and on lines round which the second direction winds; how
     many voxels see that is what is held. Measured, neighbours: over 30 degrees 0.5 to 0.9 %, over 90 degrees 0.09 to
     0.11 %, mean 4.6 to 5.3 degrees; frame to frame: 0.2 to 0.6 %, 0.02 to 0.08 %, mean 2.0 to 4.2 degrees.
     """

@@ -110,8 +110,9 @@ def test_gather_and_search_equal_their_references(shape, dimension, dominant):
         assert np.abs(position.get() - cell).max() <= 0.5
     # and from there by k-coherence
     found, _, distance = b.search.search(views.on_device(b.field), b.basis, b.grid, match)
-    best, least = views.coherent_reference(space.points, b.search.matcher.similar.get(), b.search.exemplar.shape[:-1],
-                                           queries.astype(np.float32), b.sites, b.on_host, b.grid, match.get())
+    best, least = views.coherent_reference(
+        space.points, b.search.matcher.similar.get(), b.search.exemplar.shape[:-1], queries.astype(np.float32),
+        b.sites, b.on_host, b.grid, match.get())
     np.testing.assert_allclose(distance.get(), least, rtol=1e-3, atol=1e-3)
     assert (found.get() == best).mean() > 0.95  # equal but for ties to rounding
 
@@ -122,7 +123,8 @@ def test_gather_and_search_equal_their_references(shape, dimension, dominant):
 def test_average_equals_its_reference(shape, dimension, dominant, eight):
     b = Bench(dimension, shape, dominant)
     out = opencl.empty((*shape, 4))
-    given = (opencl.to_device(b.position), opencl.to_device(b.weight), b.basis, b.grid, views.on_device(b.field), out)
+    given = (opencl.to_device(b.position), opencl.to_device(b.weight), b.basis, b.grid,
+             views.on_device(b.field), out)
     b.search.average(*given, eight, True)
     expected = views.average_reference(b.search, b.position, b.weight, b.sites, b.on_host, b.field, eight)
     np.testing.assert_allclose(out.get()[..., :3], expected, atol=2e-4)
