@@ -8,19 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from pipeline.build.artifact import Artifact, Inputs
 from pipeline.elements.exemplars import PLURALS, at_rate, in_dimensions, scaled
+from pipeline.elements.tables import ElementsScene
 from pipeline.errors import InvalidValue, attributed_to
 from pipeline.files import tracks
 from pipeline.tables import AssetOrFolder, Table, key
 from synth.elements.samples import Elements
-
-if TYPE_CHECKING:
-    from pipeline.elements.scene import ElementsScene
 
 MANY = 200  # threads or sheets, where the scene does not say how many
 LIFT = 2.5  # seconds that a lift takes at least

@@ -5,20 +5,17 @@ Lengths are heights of the domain; frames count from 0. A control that the scene
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pipeline.build.artifact import Inputs
+from pipeline.elements.tables import MOST, ElementsScene
 from pipeline.errors import InvalidValue, attributed_to
 from pipeline.files import pictures
 from synth.elements.samples import Elements
 from synth.field import domain_origin
 
-if TYPE_CHECKING:
-    from pipeline.elements.scene import ElementsScene
-
-MOST = 100_000  # elements of an output
 CROWDED = 0.6  # spacings: an output whose elements cannot be farther apart than that holds too many
 
 

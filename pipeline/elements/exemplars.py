@@ -7,18 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from pipeline.build.artifact import Artifact, Inputs, Reads
+from pipeline.elements.tables import ElementsScene
 from pipeline.errors import InvalidValue, attributed_to
 from pipeline.files import pictures, tracks
 from pipeline.tables import Asset, AssetOrFolder, Table, key
 from synth.elements.samples import Elements
-
-if TYPE_CHECKING:
-    from pipeline.elements.scene import ElementsScene
 
 PLURALS = {"none": "points", "thread": "threads", "sheet": "sheets"}
 """What elements of each topology are called."""

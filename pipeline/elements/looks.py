@@ -14,6 +14,7 @@ import numpy as np
 from pipeline.build.artifact import Artifact, Inputs, Reads
 from pipeline.build.method import Faults
 from pipeline.elements import controls
+from pipeline.elements.tables import ElementsScene
 from pipeline.files import images, meshes, usd
 from pipeline.files.meshes import Mesh
 from pipeline.flow import solid_input
@@ -21,7 +22,6 @@ from pipeline.tables import LARGEST, Look, key, listed
 from synth.elements.samples import Elements
 
 if TYPE_CHECKING:
-    from pipeline.elements.scene import ElementsScene
     from render.studio import Shot
 
 INSET = 0.6  # of the result's paths per pixel are enough for a small picture

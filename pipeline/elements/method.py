@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pipeline.build.artifact import Artifact
 from pipeline.build.method import Method
-from pipeline.elements import scene as tables
+from pipeline.elements import scene as scenes
 from pipeline.elements.coarse import carried_artifact
 from pipeline.elements.exemplars import exemplar_artifact
 from pipeline.elements.output import output_artifact
 from pipeline.elements.panels import panels
-from pipeline.elements.scene import ElementsScene
+from pipeline.elements.tables import ElementsScene
 from pipeline.flow import coarse_artifact, grids_fit, obstacles_fit, solid_artifacts
 
 
@@ -21,5 +21,5 @@ def artifacts(scene: ElementsScene) -> tuple[Artifact, ...]:
 
 
 METHOD = Method(
-    "ma13", "elements", ElementsScene,
-    (tables.look_fits, tables.for_points_alone, tables.places_fit, grids_fit, obstacles_fit), artifacts, panels)
+    "ma13", "elements", scenes.Scene,
+    (scenes.look_fits, scenes.for_points_alone, scenes.places_fit, grids_fit, obstacles_fit), artifacts, panels)

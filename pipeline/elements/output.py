@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,13 +11,11 @@ from pipeline.build.artifact import Artifact, Inputs, Needs
 from pipeline.elements import controls
 from pipeline.elements.coarse import with_coarse
 from pipeline.elements.exemplars import period_of
+from pipeline.elements.tables import ElementsScene
 from pipeline.errors import InvalidValue, attributed_to
 from pipeline.files import tracks
 from pipeline.flow import solid_input
 from synth.elements.samples import Elements
-
-if TYPE_CHECKING:
-    from pipeline.elements.scene import ElementsScene
 
 FOLLOWED = 0.2  # of its frames and samples, to each side: what a bundle does more slowly than that is not detail
 NEIGHBOURS = 9  # threads that are copied side by side

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from pipeline.build.method import Panel
-
-if TYPE_CHECKING:
-    from pipeline.elements.scene import ElementsScene
+from pipeline.elements.tables import ElementsScene
 
 
 def panels(scene: ElementsScene) -> tuple[Panel, ...]:

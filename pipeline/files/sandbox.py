@@ -1,4 +1,4 @@
-"""How a stranger's file is read: in a child process, with a limit on its memory and its time.
+"""How an untrusted file is read: in a child process, with a limit on its memory and its time.
 
 A damaged file can abort the library that reads it, make it hang or take all memory. Here it takes down a
 child, and the user reads one line.
@@ -24,7 +24,7 @@ from pipeline.errors import BadInput
 MEMORY = min(8 << 30, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2)  # bytes of address space
 SECONDS = 20.0  # and one more for each 10 MB of the file
 
-_CHILD = "from pipeline.files import shelter; shelter._answer()"
+_CHILD = "from pipeline.files import sandbox; sandbox._answer()"
 
 
 def read(function: Callable[..., dict[str, Any]], path: Path, key: str, *arguments: Any,

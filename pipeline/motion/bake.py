@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +19,8 @@ from pipeline.files import fields, meshes
 from pipeline.files.meshes import Mesh
 from pipeline.flow import solid_input, walls
 from pipeline.motion.fields import LOCAL_AXES, smoke_input, sources, towards, upsampled
+from pipeline.motion.tables import MotionScene
 from synth.field import Field, domain_origin
-
-if TYPE_CHECKING:
-    from pipeline.motion.scene import MotionScene
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,13 @@ from pipeline.build.artifact import Artifact, Inputs, Reads
 from pipeline.build.view import value_at
 from pipeline.errors import BadInput
 from pipeline.files import fields, pictures, video
+from pipeline.motion.tables import MotionScene
 from pipeline.tables import Asset, Table, key
 from synth.field import Field
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pipeline.motion.scene import MotionScene
 
 
 class ExemplarTable(Table):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,8 @@ from pipeline.build.artifact import Artifact, Frames, Inputs, Needs
 from pipeline.build.view import value_at
 from pipeline.files import fields
 from pipeline.flow import solid_input, walls
+from pipeline.motion.tables import MotionScene
 from synth.field import Field, domain_origin
-
-if TYPE_CHECKING:
-    from pipeline.motion.scene import MotionScene
 
 
 def make_smoke(scene: MotionScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, Field]]:

@@ -7,7 +7,7 @@ in render/ and its test.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Strict
@@ -17,10 +17,8 @@ from pipeline.build.method import Faults
 from pipeline.files import images
 from pipeline.flow import solid_input, walls
 from pipeline.motion import bake
+from pipeline.motion.tables import MotionScene
 from pipeline.tables import LARGEST, Look, Share, key, listed
-
-if TYPE_CHECKING:
-    from pipeline.motion.scene import MotionScene
 
 
 class MotionLook(Look):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pipeline.build.artifact import Artifact
 from pipeline.build.method import Method
 from pipeline.flow import coarse_artifact, grids_fit, obstacles_fit, solid_artifacts
-from pipeline.motion import scene as tables
+from pipeline.motion import scene as scenes
 from pipeline.motion.bake import final_artifact
 from pipeline.motion.exemplars import exemplar_artifacts
 from pipeline.motion.fields import field_artifacts
 from pipeline.motion.panels import panels, picture_artifacts
-from pipeline.motion.scene import MotionScene
+from pipeline.motion.tables import MotionScene
 
 
 def artifacts(scene: MotionScene) -> tuple[Artifact, ...]:
@@ -20,7 +20,7 @@ def artifacts(scene: MotionScene) -> tuple[Artifact, ...]:
 
 
 METHOD = Method(
-    "ma09", "detail", MotionScene,
-    (grids_fit, tables.fits_its_dimension, tables.render_fits, tables.exemplar_fits, tables.views_fit, obstacles_fit,
-     tables.samples_fit),
+    "ma09", "detail", scenes.Scene,
+    (grids_fit, scenes.fits_its_dimension, scenes.render_fits, scenes.exemplar_fits, scenes.views_fit, obstacles_fit,
+     scenes.samples_fit),
     artifacts, panels)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,7 @@ from pipeline.flow import solid_input
 from pipeline.motion.bake import transformed
 from pipeline.motion.fields import LOCAL_AXES, smoke_input, upsampled
 from pipeline.motion.looks import walls_or_far
-
-if TYPE_CHECKING:
-    from pipeline.motion.scene import MotionScene
+from pipeline.motion.tables import MotionScene
 
 ARROWS = 9  # across a picture
 LABELS = {

@@ -1,0 +1,177 @@
+"""The tiny scenes of all tests, and what tests do with scenes. Imported as `tiny`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline import stages
+from pipeline.build.checkpoint import Checkpoint
+from pipeline.build.graph import BuildGraph
+from pipeline.errors import BadInput
+from pipeline.progress import Progress
+from pipeline.scene import load
+
+SMOKE = """\
+title = "A tiny circle"
+source = "a test"
+frames = 3
+[exemplar]
+kind = "circle"
+size = 8
+[coarse]
+kind = "analytic"
+flow = "rotation"
+size = [8, 8]
+[detail]
+size = [16, 16]
+iterations = 1
+neighborhoods = [5]
+[combine]
+omega = 1.5
+[density]
+m = 2
+scale = 1
+[render]
+kind = "lit"
+width = 32
+[figure]
+panels = ["input", "coarse", "result"]
+panel = 32
+"""
+"""A scene of motion fields that runs in a second."""
+BEADS = """\
+title = "Beads that turn"
+frames = 3
+[exemplar]
+kind = "hexagonal-grid"
+across = 6
+[elements]
+size = [32, 32]
+spacing = 0.12
+[coarse]
+kind = "analytic"
+flow = "rotation"
+size = [16, 16]
+[synthesis]
+iterations = 2
+[render]
+kind = "beads"
+width = 32
+spp = 1
+[figure]
+panels = ["result"]
+panel = 32
+"""
+FISH = """\
+title = "A small school"
+frames = 3
+[exemplar]
+kind = "school"
+count = 12
+frames = 8
+[elements]
+size = [16, 16, 16]
+spacing = 0.3
+[synthesis]
+iterations = 1
+[render]
+kind = "school"
+width = 32
+height = 24
+spp = 1
+[figure]
+panels = ["result"]
+panel = 32
+"""
+NOODLES = """\
+title = "A few noodles"
+frames = 3
+[exemplar]
+kind = "noodles"
+style = "jagged"
+frames = 4
+[elements]
+count = 4
+[coarse]
+kind = "lifted"
+[synthesis]
+iterations = 1
+[render]
+kind = "noodles"
+width = 32
+height = 24
+spp = 1
+[figure]
+panels = ["result"]
+panel = 32
+"""
+PAPER = NOODLES.replace("noodles", "paper").replace("jagged", "folded").replace("lifted", "gust")
+QUIET = Progress(quiet=True)
+
+
+def changed(text: str, old: str, new: str) -> str:
+    """`text` with the first `old`, which must be there, replaced."""
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+TRACKS = changed(BEADS, 'kind = "hexagonal-grid"\nacross = 6', 'kind = "tracks"\nfile = "FILE"')
+"""Elements of the file that replaces FILE."""
+
+
+def written(folder: Path, text: str = SMOKE, name: str = "tiny.toml") -> Path:
+    """A scene file with `text`."""
+    (folder / name).write_text(text)
+    return folder / name
+
+
+def scene(folder: Path, text: str = SMOKE) -> Any:
+    """The one scene of a file with `text`."""
+    return load(written(folder, text)).variants[""]
+
+
+def graph(folder: Path, text: str = SMOKE, quick: bool = False) -> BuildGraph:
+    """The build graph of a scene with `text`, in folder/out."""
+    return stages.graph_of(load(written(folder, text), quick), folder / "out")
+
+
+def made(folder: Path, text: str = SMOKE, stage: str = "figure", frames: Sequence[int] | None = None) -> BuildGraph:
+    """The build graph after running a stage on a scene with `text`."""
+    return stages.run(stage, load(written(folder, text)), folder / "out", QUIET, frames)
+
+
+def contents(root: Path) -> dict[str, bytes]:
+    """Every file under `root`, by its path."""
+    return {file.relative_to(root).as_posix(): file.read_bytes() for file in sorted(root.rglob("*")) if file.is_file()}
+
+
+def complaint(file: Path) -> str:
+    """The line that loading `file` ends with, without its name."""
+    with pytest.raises(BadInput) as caught:
+        load(file)
+    line = str(caught.value)
+    assert line.startswith(f"{file}: ")
+    assert "\n" not in line
+    return line.removeprefix(f"{file}: ")
+
+
+class Memory:
+    """The inputs of an artifact in memory: values by (name, frame), or by name where it is of no frame.
+
+    `work` is where its checkpoint goes; the key of every frame is the same.
+    """
+
+    def __init__(self, work: Path, **files: Any):
+        self.files: dict[Any, Any] = dict(files)
+        self.asked: list[tuple[str, int]] = []
+        self.checkpoint = Checkpoint(work / "state.npz", lambda frame: "key")
+
+    def __contains__(self, name: str) -> bool:
+        return any(name in (key, key[0]) for key in self.files)
+
+    def read(self, name: str, frame: int = 0) -> Any:
+        self.asked.append((name, frame))
+        found = self.files.get((name, frame), self.files.get(name))
+        return found[frame - 1] if isinstance(found, list) else found
