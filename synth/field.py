@@ -52,7 +52,7 @@ class Field:
 
     @classmethod
     def centred(cls, values: np.ndarray, dimension: int) -> Field:
-        """The field on the house's domain: height 1, floor at y = 0, centred on x (and z)."""
+        """The field on the scene's domain: height 1, floor at y = 0, centred on x (and z)."""
         shape = values.shape[:dimension]
         return cls(values, 1.0 / shape[-2], domain_origin(shape))
 

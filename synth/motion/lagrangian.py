@@ -1,11 +1,11 @@
 """Detail at samples that move with the flow instead of on a grid (ma09 §5: "our method is equally applicable to
 Lagrangian particles", as texture synthesis over meshes [Turk 2001; Wei and Levoy 2001] is to that over pixels).
 
-Each level of the pyramid has its own samples, about one to a cell. They are carried by L and keep their detail as it
-is, so nothing is resampled and nothing worn down from frame to frame; where the flow crowds them some are taken out,
-where it thins them new ones are put in. Search and assignment are those of `synth.motion.detail`: neighbourhoods stand
-at some of the samples, see the field between the samples by moving least squares, find their best match by the same
-search, and each sample becomes the weighted average of the matches that cover it.
+Each level of the pyramid has its own samples, about one to a cell. They are carried by L and keep their detail
+unchanged, so nothing is resampled or blurred from frame to frame; where the flow crowds them some are removed, where it
+thins them new ones are added. Search and assignment are those of `synth.motion.detail`: neighbourhoods are centred at
+some of the samples, interpolate between the samples by moving least squares, and find their best match by the same
+search; each sample becomes the weighted average of the matches that cover it.
 
     p  sample, at `at` cells of its level      e  local x axis      o  offset along local axes, in cells
 """

@@ -1,8 +1,8 @@
 """Synthesis in 3-D (ma09 §3.2, §3.7, pseudocode 1 and 2): H in three dimensions from exemplars of two, or of three.
 
-As in 2-D (`detail`), from coarse to fine and from frame to frame: search and assign. The difference are the views
-(`views`), each of which matches and contributes only the components of the field that it sees; they also hold the hot
-kernels. `python -m bench solid` times a frame.
+As in 2-D (`detail`), from coarse to fine and from frame to frame: search and assign. New are the views (`views`),
+each of which matches and contributes only the components of the field that it sees; the hot kernels are there too.
+`python -m bench solid` times a frame.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from synth.motion.detail import COHERENCE, DEFORMED
 from synth.motion.local_axes import axes_3d
 from synth.motion.views import SITES_AT_ONCE, View, ViewSearch, contributions, on_device, site_grid
 
-# each level is synthesized on the domain grown by the radius of a 9² neighbourhood, as in the plane
+# each level is synthesized on the domain grown by the radius of a 9² neighbourhood, as in 2-D
 MARGIN = 4
 # mosaics tried for the first frame
 STARTS = 4
-# how much deeper than wide a block of a dominating view is: its motif is repeated along the view's normal
+# how much deeper than wide a block of a dominating view is: its motif is extruded along the view's normal
 DEEPER = 4
 
 
@@ -36,8 +36,8 @@ DEEPER = 4
 class Settings:
     """As `detail.Settings`; neighbourhoods of 9² alone (§4: "fix the neighborhood size to 9² for 3D synthesis").
 
-    search "exact" averages all matches that cover a cell; "k-coherence" is pseudocode 2: k candidates of each site
-    beside, and in each cell the match nearest to the average.
+    search "exact" averages all matches that cover a cell; "k-coherence" is pseudocode 2: k candidates from each
+    adjacent site, and in each cell the match nearest to the average.
     """
 
     levels: int

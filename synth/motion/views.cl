@@ -6,7 +6,7 @@
 // -D SPACING    distance of the sites on their grid, FIRST: position of the first
 // -D BORDER     cells by which a 2-D exemplar was continued toroidally on each side
 // -D SEEN       0: a cell is the average of all matches that cover it, 1: of those of the eight sites round it
-// and what search.cl needs.
+// and the defines of search.cl.
 
 #include "motion/search.cl"
 #include "motion/sample.h"

@@ -140,7 +140,7 @@ class ViewSearch:
 
     @property
     def slab(self) -> np.float32:
-        """How far a match reaches to the front and to the back of its plane, cells.
+        """The depth of a match's footprint in front of and behind its plane, cells.
 
         If the view is dominant this is half the neighbourhood, since no other view connects its motifs across planes.
         """

@@ -25,7 +25,7 @@ def test_three_planes_give_equation_2():
     np.testing.assert_allclose(top, [[0.5, 0], [0, 0], [0, 0.5]], atol=1e-12)
 
 
-def test_a_weighty_view_has_its_way():
+def test_a_heavy_view_dominates():
     front, side, _ = views.contributions(views_of(picture(), FRONT, SIDE, TOP, weights=(9, 1, 1)))
     np.testing.assert_allclose(front[0, 0], 0.9)
     np.testing.assert_allclose(side[1, 1], 0.1)
@@ -128,7 +128,7 @@ def test_average_equals_its_reference(shape, dimension, dominant, eight):
     b.search.average(*given, eight, True)
     expected = views.average_reference(b.search, b.position, b.weight, b.sites, b.on_host, b.field, eight)
     np.testing.assert_allclose(out.get()[..., :3], expected, atol=2e-4)
-    # a second view adds to what the first said
+    # a second view adds to the contribution of the first
     b.search.average(*given, eight, False)
     np.testing.assert_allclose(out.get()[..., :3], 2 * expected, atol=4e-4)
 
