@@ -7,7 +7,7 @@ from synth.motion.exemplar import exemplar
 from synth.motion.local_axes import axes_2d
 from synth.motion.neighborhood import exemplar_patches
 from synth.motion.quality import RADIUS, measure, measure_view, motif, oriented, whole_motifs
-from synth.motion.synthesis_3d import View
+from synth.motion.views import View
 
 CLOSED = ["circle", "square", "heart"]
 
@@ -176,7 +176,7 @@ def test_oriented_windows_read_along_the_frame():
     np.testing.assert_allclose(window[:, :, 0], np.broadcast_to(5 - np.arange(-1, 2)[:, None], (3, 5)))
 
 
-def test_local_frames_of_a_flow_are_what_measure_expects():
+def test_local_axes_of_a_flow_are_what_measure_expects():
     H, _, I = tiled()
     L = along(0, H.shape[:2])
     assert measure(H, axes_2d(L), I).forward < 2e-3
