@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 FAULT = 70  # EX_SOFTWARE of sysexits.h
 OUT = Path("out")
 STOPPED: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
-GO_ON = "run the same command again to go on from the last whole frame"
+GO_ON = "run the same command again to go on from the last complete frame"
 OURS = ("pipeline", "synth", "render")
 
 app = App(
@@ -117,7 +117,7 @@ def references(*scenes: SceneFiles, out: Out = OUT, quiet: Quiet = False) -> Non
 
 @app.command
 def doctor() -> None:
-    """Try what a render needs, each in a child process: what was found, and how to mend what is missing."""
+    """Try what a render needs, each in a child process: what was found, and what to do about what is missing."""
     from pipeline import doctor as examination
 
     examination.run()
@@ -172,7 +172,7 @@ def _terminated(_signal: int, _frame: Any) -> None:
     raise Terminated
 
 
-def _heed_signals() -> None:
+def _handle_signals() -> None:
     """SIGINT and SIGTERM end the work cleanly, and within a few seconds even in the middle of a long render.
 
     Python runs its handlers between two of its own instructions, so not while Mitsuba renders, and drops what they
@@ -196,7 +196,7 @@ def _heed_signals() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit with its code; every foreseen failure is one line on stderr."""
-    _heed_signals()
+    _handle_signals()
     sys.exit(run(sys.argv[1:] if arguments is None else list(arguments)))
 
 

@@ -115,7 +115,7 @@ class Trial:
 
     name: str
     function: Callable[[], str]
-    mending: str = "run make setup"
+    remedy: str = "run make setup"
 
 
 TRIALS = (
@@ -157,8 +157,8 @@ def run() -> None:
         if works:
             print(f"ok       {trial.name:16s} {told}", flush=True)
         else:
-            mending = "" if trial.mending in told else f"; to mend it: {trial.mending}"
-            print(f"MISSING  {trial.name:16s} {told}{mending}", flush=True)
+            remedy = "" if trial.remedy in told else f"; to fix it: {trial.remedy}"
+            print(f"MISSING  {trial.name:16s} {told}{remedy}", flush=True)
             missing.append(trial.name)
     if missing:
         raise EnvironmentMissing(f"missing: {'; '.join(missing)}")

@@ -47,13 +47,13 @@ def attributed_to(key: str) -> Iterator[None]:
 
 
 class EnvironmentMissing(FlowloomError):
-    """The machine lacks what the work needs; the text says what, and how to mend it."""
+    """The machine lacks what the work needs; the text says what, and what to do about it."""
 
     exit_code = 3
 
 
 class StorageFailed(FlowloomError):
-    """A file could not be written or read back whole, or memory ran out: `file: reason`."""
+    """A file could not be written or read back intact, or memory ran out: `file: reason`."""
 
     exit_code = 4
 

@@ -121,7 +121,8 @@ class AnalyticMotion(Motion):
 
     kind: Literal["analytic"] = key("a formula")
     size: Grid = grid("columns and rows of L", (64, 64))
-    flow: Literal["constant", "diagonal", "rotation", "shear", "saddle", "vortex-pair"] = key("its form", "constant")
+    flow: Literal["constant", "diagonal", "rotation", "shear", "saddle", "vortex-pair"] = key(
+        "form of the flow", "constant")
     speed: float = key("largest speed", 1.0, "cells of L per frame", gt=0, le=100)
     angle: float = key("turns the whole pattern", 0.0, "degrees", ge=-360, le=360)
 
@@ -206,11 +207,11 @@ class ObstacleTable(Table):
 class ShapeObstacle(ObstacleTable):
     """A solid in the flow (§3.6, figure 7). Several are one."""
 
-    kind: Literal["ball", "box"] = key("its form; a ball in the plane is a disc")
+    kind: Literal["ball", "box"] = key("form of the solid; a ball in the plane is a disc")
     centre: Annotated[tuple[float, ...], Strict(False)] = key(
         "(x, y), in 3-D (x, y, z)", ..., "heights", min_length=2, max_length=3)
     radius: Annotated[tuple[Annotated[float, Field(gt=0, le=10)], ...], Strict(False), BeforeValidator(several)] = key(
-        "of the ball, or half the box's edge; of a box one number, or one for each axis", ..., "heights",
+        "radius of the ball, or half the edge of the box; of a box one number, or one for each axis", ..., "heights",
         min_length=1, max_length=3)
     angle: float = key("turns a box in the plane of x and y", 0.0, "degrees", ge=-360, le=360)
 
@@ -270,7 +271,7 @@ class MeshObstacle(ObstacleTable):
     centre: Annotated[tuple[float, float, float], Strict(False)] | None = key(
         "where the middle of its bounding box is put; none: where it is", None, "heights")
     height: Annotated[float, Field(gt=0, le=10)] | None = key(
-        "to which it is scaled; none: its coordinates are heights", None, "heights")
+        "height to which it is scaled; none: its coordinates are heights", None, "heights")
 
     def solid(self, shape: tuple[int, ...], at: str) -> obstacle.Obstacle:
         from synth import obstacle
@@ -285,7 +286,7 @@ class LevelSetObstacle(ObstacleTable):
 
     kind: Literal["level-set"] = key("a level set")
     file: Asset = key("VDB, of any origin")
-    grid: str = key("its grid of class level set", "surface", min_length=1, max_length=200)
+    grid: str = key("name of the grid, of class level set", "surface", min_length=1, max_length=200)
 
     def solid(self, shape: tuple[int, ...], at: str) -> obstacle.Obstacle:
         from synth import obstacle

@@ -187,17 +187,17 @@ def _spelled(record: dict[str, dict[str, Any]]) -> str:
 def record_of(scene_file: Path) -> dict[str, dict[str, Any]]:
     """The record of a scene's reference, its files checked; BadInput if there is none or it is damaged."""
     folder = folder_of(scene_file)
-    mending = f"type: flowloom references {scene_file}"
+    remedy = f"type: flowloom references {scene_file}"
     try:
         record: dict[str, dict[str, Any]] = json.loads((folder / RECORD).read_text())
         damaged = [path for path, sha256 in record["files"].items() if sha256 != _sha256(folder / path)]
     except FileNotFoundError as error:
         missing = Path(error.filename).relative_to(folder)
-        raise BadInput(scene_file, "", f"has no reference ({missing} is missing); {mending}") from None
+        raise BadInput(scene_file, "", f"has no reference ({missing} is missing); {remedy}") from None
     except (ValueError, KeyError, AttributeError, TypeError) as error:
-        raise BadInput(folder / RECORD, "", f"is damaged; check it out anew, or {mending}") from error
+        raise BadInput(folder / RECORD, "", f"is damaged; check it out anew, or {remedy}") from error
     if damaged:
-        raise BadInput(folder / damaged[0], "", f"is damaged; check it out anew, or {mending}")
+        raise BadInput(folder / damaged[0], "", f"is damaged; check it out anew, or {remedy}")
     return record
 
 

@@ -81,6 +81,6 @@ fi
 
 say "the locked environment in .venv (the first time also the OpenVDB binding: about a minute)"
 "$uv" sync --quiet --locked --python "$PYTHON" ||
-    stop "uv sync failed (see above); mend it and run the same command again"
+    stop "uv sync failed (see above); fix it and run the same command again"
 touch "$STAMP"
 say "ready"

@@ -1,6 +1,7 @@
 """The house's own rules: who may import what, what things are called, and what stands beside what."""
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,14 +22,15 @@ HOMES = {
     "av": {"pipeline/files/video.py"},
     "trimesh": {"pipeline/files/meshes.py"},
     "pymeshlab": {"pipeline/files/mesh_repair.py"},
-    "cv2": {"synth/motion/exemplar.py", "synth/elements/exemplar.py"},
-    "svgpathtools": {"synth/motion/exemplar.py"},
+    "cv2": {"synth/motion/strokes.py"},
+    "svgpathtools": {"synth/motion/strokes.py"},
     "mujoco": {"synth/elements/simulation.py"},
     "pxr": {"pipeline/files/usd.py"},
     "rlic": {"render/lic.py"},
     "threadpoolctl": {"synth/motion/neighborhood.py", "synth/elements/assignment.py"},
     "cyclopts": {"pipeline/cli.py"},
-    "pydantic": {"pipeline/schema.py", "pipeline/elements_schema.py", "pipeline/scene.py"},  # tables; filling them
+    "pydantic": {"pipeline/tables.py", "pipeline/flow.py", "pipeline/motion/", "pipeline/elements/",  # tables,
+                 "pipeline/scene.py", "pipeline/schema.py"},  # filling them, writing them down
     "rich": {"pipeline/progress.py"},
     "faiss": {"bench/"},  # a peer that the bench runs beside us
 }
@@ -40,6 +42,9 @@ MAY_IMPORT = {
     "pipeline": {"pipeline", "render", "synth"},
     "bench": {"bench", "pipeline", "render", "synth"},
 }
+METHODS = {"pipeline/motion", "pipeline/elements"}
+NOT_IN_BUILD = {"pipeline.motion", "pipeline.elements", "pipeline.methods", "pipeline.flow", "pipeline.tables",
+                "render"}
 NOT_IN_METHODS = {"subprocess", "multiprocessing", "socket", "shutil", "tempfile", "logging", "tomllib"}
 VAGUE = {"utils", "util", "common", "helpers", "helper", "core", "base", "misc", "tools"}
 
@@ -81,6 +86,13 @@ def offences(where: str, source: str) -> Iterator[str]:
             yield f"{where}:{line}: {top} imports {name}; imports point one way: pipeline → render → synth"
         if top == "synth" and first in NOT_IN_METHODS:
             yield f"{where}:{line}: imports {name}; the methods know arrays, no files and no processes"
+        for method in METHODS:
+            other = method.replace("/", ".")
+            inside = any(where.startswith(f"{one}/") for one in METHODS - {method})
+            if inside and is_part(name, other):
+                yield f"{where}:{line}: imports {name}; methods import nothing of each other"
+        if where.startswith("pipeline/build/") and any(is_part(name, one) for one in NOT_IN_BUILD):
+            yield f"{where}:{line}: imports {name}; the build knows no method"
 
 
 def test_imports_keep_to_the_table() -> None:
@@ -97,6 +109,8 @@ def test_imports_keep_to_the_table() -> None:
     ("render/lic.py", "import pipeline.errors", "render imports pipeline.errors"),
     ("synth/noise.py", "import subprocess", "no files and no processes"),
     ("pipeline/x.py", "import faiss", "whose home is bench/"),
+    ("pipeline/elements/looks.py", "from pipeline.motion import bake", "methods import nothing of each other"),
+    ("pipeline/build/graph.py", "from pipeline.motion.method import METHOD", "the build knows no method"),
 ])
 def test_an_offence_is_named_with_its_line(where: str, source: str, named: str) -> None:
     assert any(named in line for line in offences(where, source))
@@ -113,37 +127,83 @@ def test_names_say_something() -> None:
     assert not vague, f"these names say nothing: {', '.join(vague)}"
 
 
-def has_test(path: Path) -> bool:
-    names = (f"test_{path.stem}.py", f"test_{path.parent.name}_{path.stem}.py")
-    return any((ROOT / "tests" / name).exists() for name in names)
+def mirror(path: Path) -> Path:
+    """Where the tests of a module stand: tests/ mirrors the folders."""
+    return ROOT / "tests" / path.relative_to(ROOT).parent / f"test_{path.stem}.py"
+
+
+def test_a_test_stands_where_its_module_does() -> None:
+    """Two methods have modules of one name: the tests of one are none of the other's."""
+    assert mirror(ROOT / "synth/motion/search.py") == ROOT / "tests/synth/motion/test_search.py"
+    assert mirror(ROOT / "synth/elements/search.py") == ROOT / "tests/synth/elements/test_search.py"
 
 
 def test_every_kernel_has_its_module_and_its_test() -> None:
     kernels = sorted(p for top in ("synth", "render") for p in (ROOT / top).rglob("*.cl"))
     assert kernels
-    alone = [place(p) for p in kernels if not p.with_suffix(".py").exists() or not has_test(p)]
+    alone = [place(p) for p in kernels if not p.with_suffix(".py").exists() or not mirror(p).exists()]
     assert not alone, f"without a .py beside it or a test of the same stem: {', '.join(alone)}"
 
 
 def test_every_module_has_its_test() -> None:
     modules = [p for p in MODULES if p.stem[0] != "_" and not place(p).startswith("bench/")]
-    untested = [place(p) for p in modules if not has_test(p)]
-    assert not untested, f"without tests/test_<module>.py: {', '.join(untested)}"
+    untested = [place(p) for p in modules if not mirror(p).exists()]
+    assert not untested, f"without tests/<folder>/test_<module>.py: {', '.join(untested)}"
+
+
+def test_each_home_of_a_library_exists_and_imports_it() -> None:
+    """A table that names a file which is gone allows nothing and hides what it should name."""
+    for library, homes in HOMES.items():
+        for home in homes:
+            files = sorted((ROOT / home).rglob("*.py")) if home.endswith("/") else [ROOT / home]
+            assert all(file.exists() for file in files), f"{home}, the home of {library}, does not exist"
+            used = any(is_part(name, library) for file in files for _, name in imports(file.read_text()))
+            assert used, f"{home}, the home of {library}, does not import it"
 
 
 def test_every_package_lists_its_modules() -> None:
     """The package's docstring is the first page a newcomer reads."""
-    for folder in ("synth", "synth/motion", "synth/elements", "render", "pipeline", "pipeline/files"):
-        told = ast.get_docstring(ast.parse((ROOT / folder / "__init__.py").read_text())) or ""
-        words = set(told.replace(",", " ").replace(".", " ").split())
-        untold = [p.stem for p in (ROOT / folder).glob("*.py") if p.stem[0] != "_" and p.stem not in words]
-        assert not untold, f"{folder}/__init__.py does not name {', '.join(sorted(untold))}"
+    for folder in sorted({path.parent for path in MODULES}):
+        page = ast.parse((folder / "__init__.py").read_text())
+        assert len(page.body) == 1, f"{place(folder)}/__init__.py holds more than its page"
+        words = set(re.split(r"[\s,./]+", ast.get_docstring(page) or ""))
+        inside = [p.stem for p in folder.iterdir() if p.suffix == ".py" or (p / "__init__.py").exists()]
+        untold = [name for name in inside if name[0] != "_" and name not in words]
+        assert not untold, f"{place(folder)}/__init__.py does not name {', '.join(sorted(untold))}"
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """Imports inside functions and for types count too: a circle is one to the reader."""
+    known = {place(p).removesuffix(".py").replace("/", "."): p for p in MODULES if p.stem != "__init__"}
+    above = {name: {other for _, other in imports(p.read_text()) if other in known and other != name}
+             for name, p in known.items()}
+    done: set[str] = set()
+
+    def visit(name: str, path: tuple[str, ...]) -> None:
+        assert name not in path, " → ".join([*path[path.index(name):], name])
+        if name not in done:
+            for other in sorted(above[name]):
+                visit(other, (*path, name))
+            done.add(name)
+
+    for name in known:
+        visit(name, ())
+
+
+def test_the_class_of_a_scene_is_asked_nowhere() -> None:
+    """What a kind means stands with the kind; a second place that asks is the one that is forgotten."""
+    for path in (ROOT / "pipeline").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "isinstance":
+                asked = ast.unparse(node.args[1]).replace("SceneView", "")
+                assert not any(name in asked for name in ("Scene", "Render", "Exemplar", "Motion", "Obstacle")), (
+                    f"{place(path)}:{node.lineno}: {ast.unparse(node)}")
 
 
 def test_no_folder_holds_one_file() -> None:
     for folder in {path.parent for path in MODULES}:
         inside = [p.name for p in folder.iterdir() if p.name not in ("__pycache__", "__init__.py")]
-        assert len(inside) > 1 or place(folder) == "bench", f"{place(folder)} holds only {inside}"
+        assert len(inside) > 1, f"{place(folder)} holds only {inside}"
 
 
 def test_the_command_starts_without_anything_heavy() -> None:

@@ -75,7 +75,7 @@ class Folder:
         return True
 
     def add(self, name: str, key: str) -> Entry:
-        """Note that `name`, just written, is whole."""
+        """Note that `name`, just written, is complete."""
         file = self.path / name
         entry = Entry(key, file.stat().st_size, file_sha256(file))
         for attempts_left in (2, 1, 0):
@@ -84,7 +84,7 @@ class Folder:
                 atomic.write_text(self.path / JOURNAL / f"{name}.note", _json({name: entry}))
                 break
             except StorageFailed as error:
-                # another process has just closed the folder, and removed its notes under our hands
+                # another process has just closed the folder, and removed its journal meanwhile
                 if not (attempts_left and isinstance(error.__cause__, FileNotFoundError)):
                     raise
         self.entries[name] = entry
@@ -98,27 +98,27 @@ class Folder:
                 os.replace(self.path / MANIFEST, self.path / JOURNAL / MANIFEST)
 
     def close(self, keys: Mapping[str, str], about: Mapping[str, Any]) -> bool:
-        """If every file of `keys` (name: key) is whole, write the manifest and tidy up; else return False."""
+        """If every file of `keys` (name: key) is up to date, write the manifest and tidy up; else return False."""
         self.entries |= _entries(self.path)  # other processes may have made some of them
         found = {name: self.up_to_date(name, key) for name, key in keys.items()}
-        whole = {name: entry for name, entry in found.items() if entry}
-        if len(whole) < len(keys):
+        complete = {name: entry for name, entry in found.items() if entry}
+        if len(complete) < len(keys):
             return False
-        written = _json(whole, about)
+        written = _json(complete, about)
         manifest = self.path / MANIFEST
         if not manifest.exists() or manifest.read_text() != written:
             atomic.write_text(manifest, written)
         self._remove(name for name in self.entries if name not in keys)
-        self.entries = whole
+        self.entries = complete
         _remove_journal(self.path)
         return True
 
     def discard(self) -> None:
-        """Remove the files that the manifest and the notes name, them, and the folder if nothing else is in it."""
+        """Remove the files that manifest and journal name, these two, and the folder if nothing else is in it."""
         self._remove(self.entries)
         (self.path / MANIFEST).unlink(missing_ok=True)
         _remove_journal(self.path)
-        with contextlib.suppress(OSError):  # the user keeps something of their own here
+        with contextlib.suppress(OSError):  # the user keeps files of their own here
             self.path.rmdir()
 
     def _remove(self, names: Iterable[str]) -> None:
@@ -127,13 +127,13 @@ class Folder:
 
 
 def _remove_journal(path: Path) -> None:
-    notes = path / JOURNAL
-    for file in notes.glob("*") if notes.is_dir() else ():
+    journal = path / JOURNAL
+    for file in journal.glob("*") if journal.is_dir() else ():
         if file.suffix != atomic.SUFFIX:
             file.unlink(missing_ok=True)
-    atomic.sweep(notes)
+    atomic.sweep(journal)
     with contextlib.suppress(OSError):  # not there, or another process is writing a note
-        notes.rmdir()
+        journal.rmdir()
 
 
 def _json(entries: Mapping[str, Entry], about: Mapping[str, Any] | None = None) -> str:
@@ -142,12 +142,12 @@ def _json(entries: Mapping[str, Entry], about: Mapping[str, Any] | None = None) 
 
 
 def _entries(path: Path) -> dict[str, Entry]:
-    """What the manifest of a folder and the notes of unfinished work say; a note is newer."""
+    """What the manifest of a folder and the journal of unfinished work say; the journal is newer."""
     found = _read(path / MANIFEST)
-    notes = path / JOURNAL
-    for file in [notes / MANIFEST, *sorted(notes.glob("*.note"))]:
+    journal = path / JOURNAL
+    for file in [journal / MANIFEST, *sorted(journal.glob("*.note"))]:
         found |= _read(file)
-    # once more: meanwhile another process may have turned the notes into a manifest
+    # once more: meanwhile another process may have turned the journal into a manifest
     return _read(path / MANIFEST) | found
 
 

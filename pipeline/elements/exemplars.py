@@ -41,7 +41,7 @@ class ArrangedExemplar(ExemplarTable):
 
     kind: Literal["poisson-disk", "jittered-grid", "hexagonal-grid"] = key("how the points are arranged")
     across: int = key("elements along its edge, about", 10, ge=2, le=200)
-    jitter: float = key("of a jittered grid: largest offset from its place", 0.25, "spacings", ge=0, le=0.5)
+    jitter: float = key("largest offset of an element of a jittered grid", 0.25, "spacings", ge=0, le=0.5)
 
     def elements(self, scene: ElementsScene) -> Elements:
         from synth.elements import arrangement
@@ -75,8 +75,8 @@ class SchoolExemplar(ExemplarTable):
     behaviour: Literal["homogeneous", "crossing", "mixed"] = key(
         "everywhere alike (figure 9a), groups between which some dart (9c), or large ones among small (9e)",
         "homogeneous")
-    count: int = key("of fish", 40, ge=2, le=2000)
-    frames: int = key("of the exemplar", 60, "frames", ge=2, le=10000)
+    count: int = key("number of fish", 40, ge=2, le=2000)
+    frames: int = key("length of the exemplar", 60, "frames", ge=2, le=10000)
 
     def elements(self, scene: ElementsScene) -> Elements:
         from synth.elements import school
@@ -94,7 +94,7 @@ class ThreadExemplar(ExemplarTable):
 
     kind: Literal["noodles"] = key("a bundle of threads")
     style: Literal["simulated", "jagged"] = key("elastic rods (figure 10b), or zigzags made by hand (10d)", "simulated")
-    frames: int = key("of the exemplar", 60, "frames", ge=2, le=10000)
+    frames: int = key("length of the exemplar", 60, "frames", ge=2, le=10000)
 
     def elements(self, scene: ElementsScene) -> Elements:
         from synth.elements import keyframed, simulation
@@ -111,7 +111,7 @@ class SheetExemplar(ExemplarTable):
     kind: Literal["paper"] = key("sheets")
     style: Literal["simulated", "folded", "fluttering"] = key(
         "in turbulent air (figure 13a), or by hand: folding, or waves along them (13b)", "simulated")
-    frames: int = key("of the exemplar", 60, "frames", ge=2, le=10000)
+    frames: int = key("length of the exemplar", 60, "frames", ge=2, le=10000)
 
     def elements(self, scene: ElementsScene) -> Elements:
         from synth.elements import keyframed, simulation
@@ -242,5 +242,5 @@ def scaled(example: Elements, factor: float) -> Elements:
 
 
 def period_of(example: Elements) -> np.ndarray | None:
-    """The period of an exemplar that repeats."""
-    return None if example.box is None else (example.box[1] - example.box[0]).astype(np.float64)
+    """The period of an exemplar that repeats, in double precision."""
+    return None if example.period is None else example.period.astype(np.float64)

@@ -207,11 +207,11 @@ class BeadsRender(ElementsLook):
     beauty_reads: ClassVar[Reads] = ("elements.domain", "elements.toroidal", "shape", "cells", "dimension")
 
     kind: Literal["beads"] = key("beads on paper")
-    width: int = key("of the picture", 800, "pixels", ge=16, le=LARGEST)
+    width: int = key("width of the picture", 800, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
     colour: Literal["exemplar", "origin"] = key(
-        "of a bead: that of what it was copied from, or by where it is in the first frame, which shows its way",
-        "exemplar")
+        "colour of a bead: that of the element it was copied from, or by its place in the first frame, which shows "
+        "its path", "exemplar")
 
     def radius(self, scene: ElementsScene) -> float | None:
         return scene.elements.radius * scene.elements.spacing
@@ -268,11 +268,11 @@ class SchoolRender(ElementsLook):
     mesh_reads: ClassVar[Reads] = ("render.speed", "elements.spacing", "seed")
 
     kind: Literal["school"] = key("fish in the sea")
-    width: int = key("of the picture", 960, "pixels", ge=16, le=LARGEST)
-    height: int = key("of the picture", 540, "pixels", ge=16, le=LARGEST)
+    width: int = key("width of the picture", 960, "pixels", ge=16, le=LARGEST)
+    height: int = key("height of the picture", 540, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 128, ge=1, le=65536)
-    speed: float = key("at which the school swims along x, as the picture follows it", 2.2, "spacings per second", ge=0,
-                       le=1000)
+    speed: float = key("speed at which the school swims along x; the picture follows it", 2.2, "spacings per second",
+                       ge=0, le=1000)
 
     @classmethod
     def mesh(cls, scene: ElementsScene, elements: Elements, frame: int, exemplar: bool = False) -> Any:
@@ -315,8 +315,8 @@ class NoodlesRender(ElementsLook):
     default_size: ClassVar[float] = 0.38
 
     kind: Literal["noodles"] = key("noodles in a studio")
-    width: int = key("of the picture", 960, "pixels", ge=16, le=LARGEST)
-    height: int = key("of the picture", 540, "pixels", ge=16, le=LARGEST)
+    width: int = key("width of the picture", 960, "pixels", ge=16, le=LARGEST)
+    height: int = key("height of the picture", 540, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
 
     @classmethod
@@ -352,11 +352,12 @@ class PaperRender(ElementsLook):
     mesh_reads: ClassVar[Reads] = ("render.colour", "seed")
 
     kind: Literal["paper"] = key("paper in a studio")
-    width: int = key("of the picture", 960, "pixels", ge=16, le=LARGEST)
-    height: int = key("of the picture", 540, "pixels", ge=16, le=LARGEST)
+    width: int = key("width of the picture", 960, "pixels", ge=16, le=LARGEST)
+    height: int = key("height of the picture", 540, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
     colour: Literal["exemplar", "mixed"] = key(
-        "of a sheet: that of what it was copied from, or by chance of a few that go together", "mixed")
+        "colour of a sheet: that of the element it was copied from, or one of a few that go together, at random",
+        "mixed")
 
     @classmethod
     def mesh(cls, scene: ElementsScene, elements: Elements, frame: int, exemplar: bool = False) -> Any:

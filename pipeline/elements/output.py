@@ -23,8 +23,8 @@ THICKEST = 2.0  # threads that `hybrid` pushes apart, over how far apart they ar
 
 
 def make_elements(scene: ElementsScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, Any]]:
-    """O, and its energy after each search (Eq. 5). An interrupted run goes on after the last whole iteration, or frame
-    by frame after the last whole frame: same bits."""
+    """O, and its energy after each search (Eq. 5). An interrupted run goes on after the last complete iteration, or
+    frame by frame after the last complete frame: same bits."""
     example = inputs.read("exemplar")
     searched, start, controlled = (_of_points if example.topology == "none" else _on_coarse)(scene, inputs, example)
     settings = _settings(scene)

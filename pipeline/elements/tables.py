@@ -28,7 +28,7 @@ class Selection(Table):
     """Where only some kinds of elements may stand (§4.1, constrained selections)."""
 
     kinds: Annotated[tuple[Annotated[int, Field(ge=0, le=30)], ...], Strict(False)] = key(
-        "of the exemplar's elements: of dots, their colours, numbered by how many there are", ..., min_length=1)
+        "kinds of the exemplar's elements: of dots, their colours, numbered by how many there are", ..., min_length=1)
     file: Asset = key("a picture that fills the domain: these kinds stand where it is bright, no other does")
 
 
@@ -36,8 +36,9 @@ class Control(Table):
     """A control map (§4.1, [Lu et al. 2007]): where which elements of the exemplar should rather stand."""
 
     file: Asset = key("a picture that fills the domain, black to white")
-    property: Literal["size", "kind"] = key("of the exemplar's elements, least to largest, that follows it", "size")
-    weight: float = key("of its difference in the search", 1.0, "squared spacings", ge=0, le=1000)
+    property: Literal["size", "kind"] = key(
+        "property of the exemplar's elements that follows the map, least to largest", "size")
+    weight: float = key("weight of the difference from the map in the search", 1.0, "squared spacings", ge=0, le=1000)
 
 
 class Elements(Table):
@@ -46,9 +47,9 @@ class Elements(Table):
     size: Grid = grid("columns and rows of the grid on which domain, obstacles and flow are known", (256, 256))
     spacing: float = key("nearest distance of elements, of sheets that of their samples: to it the exemplar is scaled",
                          0.03, "heights", gt=0, le=1)
-    radius: float = key("of a particle of the exemplar's middle size, as drawn and as it collides", 0.42, "spacings",
-                        gt=0, le=10)
-    count: int = key("of elements; 0: as dense as the exemplar, of threads and sheets 200", 0, ge=0, le=MOST)
+    radius: float = key("radius of a particle of the exemplar's middle size, as drawn and as it collides", 0.42,
+                        "spacings", gt=0, le=10)
+    count: int = key("number of elements; 0: as dense as the exemplar, of threads and sheets 200", 0, ge=0, le=MOST)
     domain: Annotated[Obstacle, Field(discriminator="kind")] | None = key(
         "a table with the keys of one of [[obstacles]]: elements stay inside; none: the whole domain", None)
     toroidal: bool = key("along x, what leaves the domain comes in on the other side", False)
@@ -71,7 +72,7 @@ class Synthesis(Table):
     whole: bool = key("neighbours in all these frames, not only the sample itself (figure 3)", False)
     sigma_p: float = key("falloff in space (Eq. 10); 0: none", 0.0, "neighbourhoods", ge=0, le=1000)
     matches: int = key("N, that predict together (§4.2)", 2, ge=1, le=4)
-    iterations: int = key("of search and assignment, at most", 8, ge=1, le=200)
+    iterations: int = key("most rounds of search and assignment", 8, ge=1, le=200)
     sequence: Literal["frames", "together"] = key("frame by frame, or all frames together", "together")
     search: Literal["exact", "k-coherence"] = key("exhaustive, or k-coherence", "k-coherence")
     assignment: Literal["sparse", "local"] = key(
@@ -85,7 +86,7 @@ class Figure(FigureTable):
     """The panels of X.png and X.mp4, set as those of other scenes."""
 
     panels: Annotated[tuple[Literal["exemplar", "coarse", "result"], ...], Strict(False)] = key(
-        "from left to right", ("exemplar", "result"), min_length=1)
+        "panels from left to right", ("exemplar", "result"), min_length=1)
     inset: bool = key("the exemplar in a corner of the result", False)
     panel: int = key("width of a panel", 640, "pixels", ge=16, le=LARGEST)
 

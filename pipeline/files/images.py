@@ -97,7 +97,7 @@ def write_picture(path: Path, picture: np.ndarray, *, half: bool = False,
 def read(path: Path) -> dict[str, np.ndarray]:
     """The channels (h, w) float32 of an EXR file, top row first; `BadInput` if it is missing or damaged.
 
-    Reads in this process; for files of our own. A stranger's field is read by `read_foreign_field`.
+    Reads in this process; for files of our own. A user's field is read by `read_foreign_field`.
     """
     return {name: values.astype(np.float32) for name, values in _own(path).items() if name != "texts"}
 
@@ -133,9 +133,9 @@ def read_field(path: Path) -> Field:
 
 
 def read_foreign_field(path: Path, key: str) -> Field:
-    """The 2-D field of anybody's EXR file, read in a child process; `key` is the scene's, for the error.
+    """The 2-D field of a user's EXR file, read in a child process; `key` is the scene's, for the error.
 
-    Without our header it lies on the house's domain, one world unit high. Raises `BadInput` for other
+    Without our header it lies on the scene's domain, one world unit high. Raises `BadInput` for other
     channels than x, y (a vector field) or Y (a scalar one), for NaN or infinity, and for a missing or damaged
     file.
     """

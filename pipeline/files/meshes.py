@@ -1,4 +1,4 @@
-"""PLY files: triangle meshes and points in world units, as arrays; strangers' meshes as voxels. The home of trimesh."""
+"""PLY files: triangle meshes and points in world units, as arrays; users' meshes as voxels. The home of trimesh."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def read_own(path: Path) -> dict[str, np.ndarray]:
 
 
 def read(path: Path, key: str) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (N, 3) float32 and triangles (M, 3) int32 of anybody's PLY file, read in a child process.
+    """Vertices (N, 3) float32 and triangles (M, 3) int32 of a user's PLY file, read in a child process.
 
     `key` is the scene's, for the error. Raises `BadInput` if the file is missing or damaged or holds no mesh.
     """
@@ -123,13 +123,13 @@ SECONDS = 120.0  # to fill them
 
 def read_solid(path: Path, key: str, pitch: float, centre: Sequence[float] | None = None,
                height: float | None = None) -> tuple[np.ndarray, tuple[float, ...]]:
-    """The voxels that anybody's PLY, OBJ or STL mesh fills, read in a child process: (Z, Y, X) bool, and where the
+    """The voxels that a user's PLY, OBJ or STL mesh fills, read in a child process: (Z, Y, X) bool, and where the
     first one's centre lies, world units.
 
     pitch   edge of a voxel
     centre  (x, y, z) where the middle of its bounding box is moved to; none: where it is
     height  of its bounding box, to which it is scaled; none: as it is
-    A mesh that is not watertight is mended. `key` is the scene's, for the error. Raises `BadInput` if the file is
+    A mesh that is not watertight is repaired. `key` is the scene's, for the error. Raises `BadInput` if the file is
     missing or damaged, holds no mesh or one that encloses nothing, or would fill more than MOST_VOXELS voxels.
     """
     found = sandbox.read(_voxels, path, key, pitch, centre, height, seconds=SECONDS)
@@ -155,7 +155,7 @@ def _voxels(path: Path, pitch: float, centre: Sequence[float] | None, height: fl
         mesh = trimesh.Trimesh(*mesh_repair.closed(mesh.vertices, mesh.faces))
     volume = float(np.abs(np.einsum("ij,ij->i", *_corners(mesh)).sum())) / 6 if len(mesh.faces) > 3 else 0.0
     if not mesh.is_watertight or not volume > 1e-9 * float(np.prod(mesh.extents)):
-        raise ValueError("is not watertight and cannot be mended: it encloses nothing")
+        raise ValueError("is not watertight and cannot be repaired: it encloses nothing")
     scale = height / mesh.extents[1] if height else 1.0
     middle = mesh.bounds.mean(axis=0)
     mesh.apply_translation(-middle)

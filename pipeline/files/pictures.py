@@ -14,7 +14,7 @@ from pipeline.errors import BadInput, StorageFailed
 from pipeline.files import atomic, sandbox
 
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709, of sRGB values
-LARGEST = 16384  # pixels along a side of a stranger's picture
+LARGEST = 16384  # pixels along a side of a user's picture
 
 
 def write(path: Path, picture: np.ndarray) -> None:
@@ -91,7 +91,7 @@ def read(path: Path) -> np.ndarray:
 
 
 def read_foreign(path: Path, key: str) -> np.ndarray:
-    """The sRGB picture (h, w, 3) float32, 0 to 1, of anybody's PNG, JPEG or TIFF; on white where transparent.
+    """The sRGB picture (h, w, 3) float32, 0 to 1, of a user's PNG, JPEG or TIFF; on white where transparent.
 
     Read in a child process; `key` is the scene's, for the error. Raises `BadInput` if it is missing, damaged
     or cut short.
@@ -103,7 +103,7 @@ def read_foreign(path: Path, key: str) -> np.ndarray:
 
 
 def read_grey(path: Path, key: str) -> np.ndarray:
-    """The grey values (Y, X) float32, 0 to 1, lowest row first, of anybody's picture; see `read_foreign`."""
+    """The grey values (Y, X) float32, 0 to 1, lowest row first, of a user's picture; see `read_foreign`."""
     return np.ascontiguousarray((read_foreign(path, key) @ LUMA)[::-1])
 
 

@@ -4,7 +4,7 @@ how their vertices make elements.
 What is read of a PLY file (ASCII, or binary of either order): `vertex` x, y, z; `face` vertex_indices; `edge` vertex1,
 vertex2. Of an OBJ file: v, l and f. The rest of both is passed over.
 
-All of this runs in a child process (`shelter`) and raises ValueError with the reason.
+All of this runs in a child process (`sandbox`) and raises ValueError with the reason.
 """
 
 from __future__ import annotations

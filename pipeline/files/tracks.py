@@ -154,7 +154,7 @@ def _require_all(path: Path, key: str, frames: list[int]) -> None:
 
 def read_foreign(path: Path, key: str, *, rate: float | None = None, otherwise: float = 24.0, dimensions: int = 2,
                  prim: str = "/", fewest_elements: int = 2, fewest_frames: int = 1) -> Elements:
-    """The elements of anybody's file, folder or sequence, see above; read in a child process.
+    """The elements of a user's file, folder or sequence, see above; read in a child process.
 
     key         the scene's, for the error
     rate        frames per second; none: what the file says, `otherwise` if it says nothing

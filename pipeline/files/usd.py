@@ -106,8 +106,10 @@ def _require_surface(name: str, frame: int, surface: Surface) -> None:
 
 def linear(colours: np.ndarray) -> np.ndarray:
     """sRGB in 0..1, or 0..255 as uint8, as linear Rec.709 float32."""
-    c = np.asarray(colours, np.float64) / (255 if colours.dtype == np.uint8 else 1)
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    from render import tonemap
+
+    scale = 255 if colours.dtype == np.uint8 else 1
+    return tonemap.from_srgb(np.asarray(colours, np.float64) / scale).astype(np.float32)
 
 
 class _Stage:
@@ -293,7 +295,7 @@ def _digest(values: np.ndarray) -> bytes:
 
 def geometry(path: Path, prim: str) -> tuple[np.ndarray, list[tuple[int, ...]], list[tuple[int, ...]], float]:
     """What a USD file shows at or below `prim`: vertices (T, N, 3) float32, y up, at each whole time code; lines and
-    faces of indices of them; frames per second. Runs in a child process (`shelter`).
+    faces of indices of them; frames per second. Runs in a child process (`sandbox`).
 
     Points and point instancers have neither lines nor faces; curves are lines of their control points. Units stay as
     they are; a scene that is z up is turned. Raises ValueError: no such prim, nothing of these or several kinds of

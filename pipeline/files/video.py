@@ -14,7 +14,7 @@ from pipeline.errors import StorageFailed
 from pipeline.files import atomic, sandbox
 from pipeline.files.pictures import LUMA, as_bytes
 
-MOST_FRAMES = 1000  # of a stranger's clip
+MOST_FRAMES = 1000  # of a user's clip
 _FORMAT = {"movflags": "+faststart", "fflags": "+bitexact"}
 # mbtree: x264's AVX-512 code for it reads beside its rows, and makes other bytes from run to run
 _CODEC = {"preset": "slow", "tune": "animation", "x264-params": "mbtree=0"}
@@ -100,7 +100,7 @@ def _frames(path: Path) -> dict[str, Any]:
 
 
 def read_grey(path: Path, key: str) -> np.ndarray:
-    """The grey values (N, Y, X) float32, 0 to 1, lowest row first, of anybody's clip (in a child process).
+    """The grey values (N, Y, X) float32, 0 to 1, lowest row first, of a user's clip (in a child process).
 
     `key` is the scene's, for the error. Raises `BadInput` if it is missing or damaged, or has fewer than two
     frames.

@@ -124,7 +124,7 @@ def metadata(path: Path) -> dict[str, str]:
 
 
 def read_foreign(path: Path, name: str) -> Field:
-    """Grid `name` of anybody's VDB file, read in a child process; without a stored shape its active voxels.
+    """Grid `name` of a user's VDB file, read in a child process; without a stored shape its active voxels.
 
     Raises `BadInput`: no such file or grid, damaged, not read here (see above), NaN or infinity.
     """
@@ -136,7 +136,7 @@ def read_foreign(path: Path, name: str) -> Field:
 
 
 def read_level_set(path: Path, name: str, key: str) -> Field:
-    """The distances of level set `name` of anybody's VDB file, read in a child process: its active voxels and those
+    """The distances of level set `name` of a user's VDB file, read in a child process: its active voxels and those
     between them. `key` is the scene's, for the error.
 
     Raises `BadInput`: no such file or grid, no level set, damaged, not read here (see above), NaN or infinity.

@@ -80,7 +80,7 @@ class LitRender(SmokeLook):
     path_traced: ClassVar[bool] = False
 
     kind: Literal["lit"] = key("a sheet of smoke that shadows itself")
-    width: int = key("of the picture", 1024, "pixels", ge=16, le=LARGEST)
+    width: int = key("width of the picture", 1024, "pixels", ge=16, le=LARGEST)
 
     def picture(self, density: Any, seed: int) -> np.ndarray:
         from render import smoke
@@ -96,8 +96,8 @@ class InkRender(SmokeLook):
     path_traced: ClassVar[bool] = False
 
     kind: Literal["ink"] = key("ink on paper")
-    width: int = key("of the picture", 1024, "pixels", ge=16, le=LARGEST)
-    colour: Literal["indigo", "sepia", "black"] = key("of the ink", "indigo")
+    width: int = key("width of the picture", 1024, "pixels", ge=16, le=LARGEST)
+    colour: Literal["indigo", "sepia", "black"] = key("colour of the ink", "indigo")
 
     def picture(self, density: Any, seed: int) -> np.ndarray:
         from render import smoke
@@ -112,17 +112,17 @@ class VolumeRender(SmokeLook):
     draws_volume: ClassVar[bool] = True
 
     kind: Literal["volume"] = key("a volume in a studio")
-    width: int = key("of the picture", 512, "pixels", ge=16, le=LARGEST)
-    height: int = key("of the picture", 640, "pixels", ge=16, le=LARGEST)
+    width: int = key("width of the picture", 512, "pixels", ge=16, le=LARGEST)
+    height: int = key("height of the picture", 640, "pixels", ge=16, le=LARGEST)
     method: Literal["path", "march", "both"] = key(
         "path-traced, marched, or both: the still path-traced, the animation marched", "path")
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
     denoised: bool = key("fit the paths to guides without noise", True)
-    extinction: float = key("of smoke of density 1", 110.0, "per height", gt=0, le=10000)
+    extinction: float = key("extinction of smoke of density 1", 110.0, "per height", gt=0, le=10000)
     bowl: Annotated[tuple[Share, Share], Strict(False)] | None = key(
         "radius and height of the bowl that the plume rises from", None, "heights")
-    elevation: float | None = key("of the camera above the horizon; none: about level with the plume", None, "degrees",
-                                  ge=0, le=85)
+    elevation: float | None = key("elevation of the camera above the horizon; none: about level with the plume", None,
+                                  "degrees", ge=0, le=85)
 
     def artifacts(self, scene: MotionScene) -> tuple[Artifact, ...]:
         density = bake.density_artifact(scene)
@@ -148,8 +148,8 @@ class SeaweedRender(MotionLook):
     dimensions: ClassVar[tuple[int, ...]] = (3,)
 
     kind: Literal["seaweed"] = key("blades under water")
-    width: int = key("of the picture", 960, "pixels", ge=16, le=LARGEST)
-    height: int = key("of the picture", 540, "pixels", ge=16, le=LARGEST)
+    width: int = key("width of the picture", 960, "pixels", ge=16, le=LARGEST)
+    height: int = key("height of the picture", 540, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 64, ge=1, le=65536)
 
     def artifacts(self, scene: MotionScene) -> tuple[Artifact, ...]:
@@ -171,7 +171,7 @@ class ParticlesRender(MotionLook):
     dimensions: ClassVar[tuple[int, ...]] = (2,)
 
     kind: Literal["particles"] = key("foam on a river")
-    width: int = key("of the picture (figure 7: 640×480)", 640, "pixels", ge=16, le=LARGEST)
+    width: int = key("width of the picture (figure 7: 640×480)", 640, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel of the stones", 128, ge=1, le=65536)
     streak: float = key("length of a streak, in time", 1.2, "frames", ge=0, le=100)
     white: float = key("speed at which foam is white", 0.7, "heights per second", gt=0, le=1000)
@@ -217,7 +217,7 @@ class NoRender(MotionLook):
     """No smoke: a figure of fields alone; nothing is baked but F."""
 
     kind: Literal["none"] = key("fields only")
-    width: int = key("of a panel", 1024, "pixels", ge=16, le=LARGEST)
+    width: int = key("width of a panel", 1024, "pixels", ge=16, le=LARGEST)
 
     def faults(self, scene: MotionScene) -> Faults:
         if "result" in scene.figure.panels:

@@ -39,13 +39,13 @@ class View(Table):
     their sizes may differ, up to four times. A VDB as exemplar (kind "field") is a view of all three components."""
 
     plane: Literal["front", "side", "top"] | None = key(
-        "that the exemplar's x and y axis lie in: front x, y; side z, y; top x, z", None)
+        "plane of the exemplar's x and y axis: front x, y; side z, y; top x, z", None)
     right: Vector | None = key("the exemplar's x axis in the local frame, instead of a plane", None, min_length=3,
                                max_length=3)
-    up: Vector | None = key("its y axis, made perpendicular to right", None, min_length=3, max_length=3)
-    weight: float = key("of its matches beside those of the other views (§4)", 1.0, gt=0, le=1000)
+    up: Vector | None = key("the exemplar's y axis, made perpendicular to right", None, min_length=3, max_length=3)
+    weight: float = key("weight of its matches beside those of the other views (§4)", 1.0, gt=0, le=1000)
     exemplar: Annotated[Exemplar, Field(discriminator="kind")] | None = key(
-        "its own, a table with the keys of [exemplar]; none: that one", None)
+        "the exemplar of this view, a table with the keys of [exemplar]; none: [exemplar] itself", None)
 
     @property
     def axes(self) -> tuple[Triple, Triple]:

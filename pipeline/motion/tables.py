@@ -34,11 +34,11 @@ class Detail(Table):
 
     size: Grid = grid("columns and rows of H and F", (256, 256))
     levels: Annotated[int, Field(ge=1, le=10)] | Literal["auto"] = key(
-        "of the image pyramid; \"auto\" brings the exemplar down to 8 cells", "auto")
+        "levels of the image pyramid; \"auto\" brings the exemplar down to 8 cells", "auto")
     neighborhoods: Annotated[tuple[Width, ...], Strict(False)] = key(
         "widths, odd, in the order used (§4: 17² followed by 9²; 9² in 3-D)", _neighborhoods, "cells",
         min_length=1, max_length=4)
-    iterations: int = key("of search and assignment with each width (§4: 3 to 5)", 4, ge=1, le=50)
+    iterations: int = key("rounds of search and assignment with each width (§4: 3 to 5)", 4, ge=1, le=50)
     search: Literal["exact", "k-coherence"] = key("exact, or k-coherence (§3.7)", _search)
     k: int = key("candidates of k-coherence", 4, ge=1, le=32)
     along: Literal["x", "y"] = key("the exemplar's axis that follows L (§3.3); \"y\": upright motifs rise upright", "x")
@@ -68,18 +68,18 @@ class Source(Table):
     """Where smoke enters, in every frame (supplement A: "inject density sources").
     World units: the domain is 1 high, its floor at y = 0, centred on x = 0 and z = 0."""
 
-    kind: Literal["ball", "box"] = key("its form", "ball")
+    kind: Literal["ball", "box"] = key("form of the source", "ball")
     centre: Annotated[tuple[float, ...], Strict(False)] = key(
         "(x, y) or (x, y, z)", (0.0, 0.1), "heights", min_length=2, max_length=3)
     radius: Annotated[tuple[Annotated[float, Field(gt=0, le=10)], ...], Strict(False), BeforeValidator(several)] = key(
-        "of the ball, or half the box's edge; one number, or one for each axis", (0.08,), "heights",
+        "radius of the ball, or half the edge of the box; one number, or one for each axis", (0.08,), "heights",
         min_length=1, max_length=3)
     softness: float = key("share of the radius over which the edge fades", 0.3, ge=0, le=1)
     level: float = key("density injected", 1.0, ge=0, le=1)
     streaks: float = key("contrast of streaks, which draw the paths of the smoke", 0.0, ge=0, le=1)
     streak_size: float = key("width of a streak", 0.02, "heights", gt=0, le=1)
-    streak_period: float = key("in which the streaks change", 40.0, "frames", gt=0, le=100000)
-    period: int = key("of puffs", 1, "frames", ge=1, le=100000)
+    streak_period: float = key("period in which the streaks change", 40.0, "frames", gt=0, le=100000)
+    period: int = key("period of puffs", 1, "frames", ge=1, le=100000)
     duty: float = key("share of the period during which smoke enters", 1.0, ge=0, le=1)
 
 
@@ -106,17 +106,17 @@ class Blades(Table):
     """A bed of seaweed that F bends (§4, figure 9: "use that to direct the movements of points on the seaweed
     polygonal models"); for fields in space."""
 
-    height: float = key("of the tallest blade", 0.95, "heights", gt=0, le=2)
+    height: float = key("height of the tallest blade", 0.95, "heights", gt=0, le=2)
     spacing: float = key("least distance of two plants", 0.13, "heights", ge=0.03, le=2)
-    cover: Share = key("of the floor that plants stand on, in patches", 0.5)
+    cover: Share = key("share of the floor that plants stand on, in patches", 0.5)
     bend: float = key("tangent of the angle by which a flow of one height per second bends a tip", 2.0, ge=0, le=100)
-    window: int = key("whose motion a tip follows; half of it is its lag", 9, "frames", ge=1, le=100)
+    window: int = key("frames whose motion a tip follows; it lags by half of them", 9, "frames", ge=1, le=100)
 
 
 class Particles(Table):
     """Particles that F carries, for [render] kind = "particles" (figure 7)."""
 
-    count: int = key("how many", 40000, ge=1, le=10000000)
+    count: int = key("number of particles", 40000, ge=1, le=10000000)
     life: int = key("after which one is born again elsewhere", 60, "frames", ge=2, le=100000)
 
 
@@ -133,8 +133,8 @@ class Figure(FigureTable):
     """The panels of X.png and X.mp4. With several variants and one panel, one panel for each of them; with
     several of both, one row for each variant. A panel of the exemplar stands once for each exemplar of the views."""
 
-    panels: Annotated[tuple[Panel, ...], Strict(False)] = key("from left to right", ("result",), min_length=1)
-    plane: Literal["front", "side", "top"] = key("of the middle slice that panels of 3-D fields show", "front")
+    panels: Annotated[tuple[Panel, ...], Strict(False)] = key("panels from left to right", ("result",), min_length=1)
+    plane: Literal["front", "side", "top"] = key("plane of the middle slice that panels of 3-D fields show", "front")
 
 
 class MotionScene(SceneInFlow):
