@@ -1,5 +1,5 @@
-# flowloom: `make` shows what there is. Each recipe is one line that calls the command `flowloom`; what is stale is
-# decided there, by content (each folder's manifest.json), so a figure is always asked and mostly answers at once.
+# flowloom: `make` lists the targets. Each recipe is one line that calls the command `flowloom`. That command decides by
+# content (each folder's manifest.json) what is out of date, so figures are phony targets, and most runs end at once.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -O inherit_errexit -c
@@ -8,7 +8,7 @@ MAKEFLAGS += --no-builtin-rules --warn-undefined-variables
 .SUFFIXES:
 .DEFAULT_GOAL := help
 
-# An active environment of the user's must not reach into ours.
+# An active Python environment of the user must not affect ours.
 unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV
 
 QUICK ?=
@@ -22,9 +22,9 @@ STAMP := .venv/flowloom.stamp
 FIGURES := $(patsubst scenes/%.toml,%,$(wildcard scenes/*.toml))
 OPTIONS := $(if $(QUICK),--quick)
 
-##@ First
+##@ Start
 .PHONY: help demo test
-help: ## this page
+help: ## this list
 	@awk 'BEGIN { FS = ":.*## " } /^##@/ { printf "\n%s\n", substr($$0, 5) } \
 		/^[a-z][^:]*:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@printf '\nFigures (make QUICK=1 <figure>: small and fast, in out/quick)\n'
@@ -43,34 +43,34 @@ figures: $(FIGURES) ## every figure
 $(FIGURES): $(STAMP)
 	$(FLOWLOOM) figure scenes/$@.toml $(OPTIONS)
 
-diff: $(STAMP) ## render the proof frames anew and compare them with tests/references; exit 1 if they differ
+diff: $(STAMP) ## run every scene small and compare it with tests/references; exit 1 if one differs
 	$(FLOWLOOM) diff
 
-references: $(STAMP) ## write tests/references anew (look at `make diff` first)
+references: $(STAMP) ## replace tests/references by what the scenes give now (look at `make diff` first)
 	$(FLOWLOOM) references
 
 gallery: figures ## one page of all figures: out/gallery.html
 	$(FLOWLOOM) gallery
 
-farm: $(STAMP) ## one figure by several processes: make farm SCENE=scenes/ma09-fig01.toml WORKERS=4
+farm: $(STAMP) ## one figure on several processes: make farm SCENE=scenes/ma09-fig01.toml WORKERS=4
 	$(if $(SCENE),,$(error make farm needs SCENE=scenes/<figure>.toml))$(FLOWLOOM) farm $(SCENE) --workers $(WORKERS) $(OPTIONS)
 
-bench: $(STAMP) ## speed and quality, side by side with references and the papers
+bench: $(STAMP) ## measure speed and quality against targets, other programs and the papers: bench/RESULTS.md
 	$(PYTHON) -m bench
 
-##@ The house
+##@ Development
 .PHONY: setup doctor lint clean
 setup: $(STAMP) ## system packages (root or sudo), the locked environment, the OpenVDB binding
 
 $(STAMP): pipeline/setup.sh pyproject.toml uv.lock CMakeLists.txt pipeline/files/openvdb.cpp
 	@pipeline/setup.sh
 
-doctor: $(STAMP) ## try what a render needs; one line each says what was found and how to mend what is not
+doctor: $(STAMP) ## check what a render needs: one line each, with what to do about what is missing
 	$(FLOWLOOM) doctor
 
 lint: $(STAMP) ## ruff and mypy
 	.venv/bin/ruff check .
 	.venv/bin/mypy
 
-clean: ## remove what was made: pictures and fields (out), the environment, caches
+clean: ## remove all outputs (out), the environment and caches
 	rm -rf out build .venv .cache
