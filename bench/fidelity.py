@@ -15,10 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import guides, scene, stages
-from pipeline.elements import in_detail
-from pipeline.elements_schema import ElementsScene
-from pipeline.product import Stock
+from pipeline import scene, stages
+from pipeline.build.artifact import Inputs
+from pipeline.build.graph import DeclaredInputs
+from pipeline.elements import controls
+from pipeline.elements.output import in_detail
+from pipeline.elements.tables import ElementsScene
 from pipeline.progress import Progress
 from synth.elements import collision, fidelity, orientation
 from synth.elements.neighborhood import spacing
@@ -51,14 +53,14 @@ def row(example: Elements, output: Elements, given: Seen, found: Seen) -> dict[s
             "in the exemplar": crossed(example) if threads else None}
 
 
-def of_points(one: ElementsScene, stock: Stock, example: Elements, output: Elements) -> tuple[Seen, Seen]:
+def of_points(one: ElementsScene, inputs: Inputs, example: Elements, output: Elements) -> tuple[Seen, Seen]:
     """Points of an exemplar that repeats, or not, and of an output in its domain and flow."""
     period = None if example.box is None else (example.box[1] - example.box[0]).astype(np.float64)
     unit = spacing(example.positions, period)
-    region = guides.domain(one, stock)
-    flow = guides.flow(one, stock, region)
+    region = controls.domain(one, inputs)
+    flow = controls.flow(one, inputs, region)
     moved = None if flow is None else carried(flow, output.positions)
-    found = fidelity.statistics(output.positions, unit, guides.toroidal(one), region.distance, moved)
+    found = fidelity.statistics(output.positions, unit, controls.toroidal(one), region.distance, moved)
     return (Seen(fidelity.statistics(example.positions, unit, period), example.positions),
             Seen(found, output.positions))
 
@@ -96,24 +98,22 @@ def details(elements: Elements) -> np.ndarray:
     return np.einsum("nji,nj->ni", axes, moved).reshape(elements.frames, -1, 1, 3)
 
 
-def rows_of(file: Path) -> list[dict[str, Any]]:
-    """All variants of a scene file; none if it is not a scene of elements."""
-    scenes = scene.load(file)
-    if not all(isinstance(one, ElementsScene) for one in scenes.variants.values()):
+def rows_of(file: Path, quick: bool = False) -> list[dict[str, Any]]:
+    """All variants of a scene file, at its quick settings or not; none if it is not a scene of elements."""
+    loaded = scene.load(file, quick)
+    if loaded.method.name != "ma13":
         return []
-    stages.run("synth", scenes, OUT, Progress(quiet=True))
-    works = stages.Works(scenes, OUT)
+    graph = stages.run("synth", loaded, OUT, Progress(quiet=True))
     found = []
-    for variant, one in scenes.variants.items():
-        assert isinstance(one, ElementsScene)
-        stock = works.stock(variant, "elements")
-        example, output = stock.read("exemplar"), stock.read("elements")
+    for variant, one in loaded.variants.items():
+        inputs = DeclaredInputs(graph, variant, graph.artifacts[variant]["elements"])
+        example, output = inputs.read("exemplar"), graph.read(variant, "elements", 0)
         if example.topology == "none":
-            given, seen = of_points(one, stock, example, output)
+            given, seen = of_points(one, inputs, example, output)
         else:
             example = in_detail(example)
             given, seen = map(of_threads if example.topology == "thread" else of_sheets, (example, output))
-        found.append({"scene": scenes.name, "variant": variant, **row(example, output, given, seen)})
+        found.append({"scene": loaded.name, "variant": variant, **row(example, output, given, seen)})
     return found
 
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field, Strict
+from pydantic import Field, Strict
 
 from pipeline.build.artifact import Artifact, Inputs, Needs, Reads
 from pipeline.build.method import Faults
 from pipeline.errors import BadInput
 from pipeline.files import fields, meshes, pictures, volumes
-from pipeline.tables import Asset, Grid, SceneTables, Table, grid, key, listed, several
+from pipeline.tables import Asset, Grid, Radius, SceneTables, Table, grid, key, listed
 from synth.field import Field as MotionField
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ class ShapeObstacle(ObstacleTable):
     kind: Literal["ball", "box"] = key("form of the solid; a ball in the plane is a disc")
     centre: Annotated[tuple[float, ...], Strict(False)] = key(
         "(x, y), in 3-D (x, y, z)", ..., "heights", min_length=2, max_length=3)
-    radius: Annotated[tuple[Annotated[float, Field(gt=0, le=10)], ...], Strict(False), BeforeValidator(several)] = key(
+    radius: Radius = key(
         "radius of the ball, or half the edge of the box; of a box one number, or one for each axis", ..., "heights",
         min_length=1, max_length=3)
     angle: float = key("turns a box in the plane of x and y", 0.0, "degrees", ge=-360, le=360)

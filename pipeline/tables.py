@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, ValidationInfo
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict, ValidationInfo
 
 PROJECT_SCENES = Path(__file__).resolve().parent.parent / "scenes"
 LARGEST = 4096  # cells or pixels along an axis; a larger number is most likely a typing error
@@ -75,9 +75,14 @@ def _odd(width: int) -> int:
     return width
 
 
-def several(value: object) -> object:
-    """One number where an array may stand."""
+def _several(value: object) -> object:
     return [value] if isinstance(value, int | float) else value
+
+
+Extent = Annotated[float, Field(gt=0, le=10)]
+Radius = Annotated[tuple[Extent, ...], Strict(False), BeforeValidator(
+    _several, json_schema_input_type=Extent | Annotated[list[Extent], Field(min_length=1, max_length=3)])]
+"""One number, or one for each axis."""
 
 
 Width = Annotated[int, Field(ge=3, le=33), AfterValidator(_odd)]

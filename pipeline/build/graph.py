@@ -167,9 +167,7 @@ class BuildGraph:
 
         Raises BadInput if a stage before it has not been run.
         """
-        names = self._in_order(stage)
-        self._check_user_files(names)
-        for name in names:
+        for name in self._in_order(stage):
             for variant in self.distinct_variants(name):
                 self._make(variant, name, frames, progress)
         self._close(stage)
@@ -194,9 +192,9 @@ class BuildGraph:
             place(name)
         return order
 
-    def _check_user_files(self, names: list[str]) -> None:
-        """Read every file of the user's that is still needed, and check what else can be, before writing anything."""
-        for name in names:
+    def check(self, stage: str) -> None:
+        """Read every file of the user's that a stage still needs, and check what else can be, before any work."""
+        for name in self._in_order(stage):
             for variant in self.distinct_variants(name):
                 artifact, scene = self.artifacts[variant][name], self.variants[variant]
                 first = artifact.check is None and not artifact.inputs and keys.reads_files(artifact, scene)
@@ -215,7 +213,7 @@ class BuildGraph:
         try:
             yield
         except ValueError as error:
-            key = error.key if isinstance(error, InvalidValue) else artifact.reads[0]
+            key = error.key if isinstance(error, InvalidValue) else next(iter(artifact.reads), artifact.name)
             raise BadInput(self.file_of_scene, key, str(error)) from error
 
     def run(self, variant: str, name: str, frames: Sequence[int]) -> Iterator[tuple[int, Any]]:

@@ -23,6 +23,8 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 ROOT = Path(__file__).resolve().parents[2]
 WHOLE = ("synth", "render")
 COMPUTES_NOTHING = ("pipeline.build", "pipeline.errors", "pipeline.tables", "pipeline.files.atomic",
@@ -60,12 +62,14 @@ def sources(functions: Iterable[Callable[..., Any]], tables: Iterable[type] = ()
             elif isinstance(value, type):
                 waiting += _methods(value)
             else:
-                found[f"{place} {name} {_sha256(repr(value))}"] = place
+                found[f"{place} {name} {_sha256(_spelled(value))}"] = place
+                waiting += [(inner, None) for inner in _functions_in(value)]
     return found
 
 
-def _plain(function: Any) -> Any:
-    return inspect.unwrap(getattr(function, "__func__", function))
+def _plain(value: Any) -> Any:
+    """A function without what decorators put round it; anything else as it is."""
+    return inspect.unwrap(getattr(value, "__func__", value)) if callable(value) or hasattr(value, "__func__") else value
 
 
 def _owner(function: Any) -> type | None:
@@ -97,7 +101,7 @@ def _named(function: types.FunctionType, owner: type | None) -> Iterator[tuple[s
     """What of ours a function names: functions, classes and constants of pipeline, files of synth and render."""
     names = list(_names(function.__code__))
     for name in names:
-        value = function.__globals__.get(name)
+        value = _plain(function.__globals__.get(name))
         if isinstance(value, types.ModuleType) and _counts(f"{value.__name__}."):
             yield from ((inner, vars(value)[inner]) for inner in names if _is_ours(vars(value).get(inner)))
         elif isinstance(value, types.ModuleType) and value.__name__.split(".")[0] in WHOLE:
@@ -129,7 +133,26 @@ def _is_ours(value: Any) -> bool:
         value = value.fget
     if isinstance(value, types.FunctionType | types.MethodType | type):
         return _counts(getattr(value, "__module__", "") or "")
-    return isinstance(value, int | float | str | tuple | dict | list) or type(value).__module__ == "numpy"
+    return isinstance(value, int | float | str | tuple | dict | list | np.ndarray | re.Pattern)
+
+
+def _spelled(value: Any) -> str:
+    """A constant as text: the same in every process."""
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape} {value.tobytes()!r}"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{name!r}: {_spelled(inner)}' for name, inner in value.items())}}}"
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(_spelled, value))}]"
+    return getattr(value, "__qualname__", None) or repr(value)
+
+
+def _functions_in(value: Any) -> Iterator[types.FunctionType]:
+    """The functions of pipeline in a table of them."""
+    for inner in value.values() if isinstance(value, dict) else value if isinstance(value, tuple | list) else ():
+        if isinstance(inner, types.FunctionType):
+            yield inner
+        yield from _functions_in(inner)
 
 
 def _code_digest(function: types.FunctionType) -> str:

@@ -1,7 +1,6 @@
 """The coarse motion C of threads and sheets (ma13): each kind one class, its keys and its elements; artifact `coarse`.
 
-Points are carried by a field instead, one of `pipeline.flow`. A new kind is one class here, its place in `Carried` and
-in the `carried_by` of the looks that it carries.
+Points are carried by a field instead, one of `pipeline.flow`. A new kind is one class here and its place in `Carried`.
 """
 
 from __future__ import annotations
@@ -28,6 +27,8 @@ class CarriedMotion(Table):
     """A coarse motion that is elements, not a field."""
 
     is_field: ClassVar[bool] = False
+    topology: ClassVar[str | None] = None
+    """Of the elements that it carries, as a look `draws` them; None: of threads and of sheets."""
 
     def check(self, scene: ElementsScene) -> None:
         """Refuse files that cannot be used."""
@@ -39,6 +40,8 @@ class CarriedMotion(Table):
 
 class CarriedThreads(CarriedMotion):
     """C of noodles: the motion of one is that of all, beside each other (§6.2)."""
+
+    topology: ClassVar[str | None] = "thread"
 
     kind: Literal["lifted"] = key("a bundle lifted from a plate (figure 10a)")
 
@@ -61,6 +64,8 @@ class CarriedThreads(CarriedMotion):
 
 class CarriedSheets(CarriedMotion):
     """C of sheets: each moves stiffly in a gust (figure 13c)."""
+
+    topology: ClassVar[str | None] = "sheet"
 
     kind: Literal["gust"] = key("a gust that tosses them")
 

@@ -26,8 +26,10 @@ FEWEST_SAMPLES = 4  # of a thread
 class ExemplarTable(Table):
     """One exemplar."""
 
-    looks: ClassVar[tuple[str, ...]] = ("beads",)
-    """The [render] kinds that draw it."""
+    topology: ClassVar[str | None] = "none"
+    """How its elements hang together, as a look `draws` them; None: as the file has them."""
+    dimension: ClassVar[int | None] = 2
+    """Of its elements; None: as the scene's."""
     reads: ClassVar[Reads] = ()
     """What `elements` reads of the scene beside the table itself, seed and fps."""
 
@@ -69,7 +71,7 @@ class DotsExemplar(ExemplarTable):
 class SchoolExemplar(ExemplarTable):
     """Fish that swim together along x (figure 9)."""
 
-    looks: ClassVar[tuple[str, ...]] = ("school",)
+    dimension: ClassVar[int | None] = 3
 
     kind: Literal["school"] = key("fish")
     behaviour: Literal["homogeneous", "crossing", "mixed"] = key(
@@ -90,7 +92,8 @@ class SchoolExemplar(ExemplarTable):
 class ThreadExemplar(ExemplarTable):
     """A small bundle of noodles (figure 10b, d)."""
 
-    looks: ClassVar[tuple[str, ...]] = ("noodles",)
+    topology: ClassVar[str | None] = "thread"
+    dimension: ClassVar[int | None] = 3
 
     kind: Literal["noodles"] = key("a bundle of threads")
     style: Literal["simulated", "jagged"] = key("elastic rods (figure 10b), or zigzags made by hand (10d)", "simulated")
@@ -106,7 +109,8 @@ class ThreadExemplar(ExemplarTable):
 class SheetExemplar(ExemplarTable):
     """A few sheets of paper (figure 13a, b)."""
 
-    looks: ClassVar[tuple[str, ...]] = ("paper",)
+    topology: ClassVar[str | None] = "sheet"
+    dimension: ClassVar[int | None] = 3
 
     kind: Literal["paper"] = key("sheets")
     style: Literal["simulated", "folded", "fluttering"] = key(
@@ -125,7 +129,8 @@ class SheetExemplar(ExemplarTable):
 class TracksExemplar(ExemplarTable):
     """Elements made elsewhere: tracked in a film (figure 11), simulated, modelled."""
 
-    looks: ClassVar[tuple[str, ...]] = ("beads", "school", "noodles", "paper")
+    topology: ClassVar[str | None] = None
+    dimension: ClassVar[int | None] = None
     reads: ClassVar[Reads] = ("dimension", "render.kind", "render.draws", "render.fewest_frames", "render.default_size")
 
     kind: Literal["tracks"] = key("positions over time")

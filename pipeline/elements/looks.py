@@ -7,13 +7,15 @@ and its coarse motion. A new look is one class here, its place in `Render`, a mo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 
 from pipeline.build.artifact import Artifact, Inputs, Reads
 from pipeline.build.method import Faults
 from pipeline.elements import controls
+from pipeline.elements.coarse import Carried
+from pipeline.elements.exemplars import ExemplarTable
 from pipeline.elements.tables import ElementsScene
 from pipeline.files import images, meshes, usd
 from pipeline.files.meshes import Mesh
@@ -35,8 +37,6 @@ class ElementsLook(Look):
     """How its elements hang together: points, threads or sheets."""
     dimension: ClassVar[int] = 3
     """Of the elements."""
-    carried_by: ClassVar[tuple[str, ...]] = ()
-    """The kinds of [coarse] that threads and sheets have; points are carried by a field."""
     default_size: ClassVar[float] = 0.0
     """Length of a fish, radius of a thread, thickness of a sheet whose file does not say it, spacings."""
     fewest_frames: ClassVar[int] = 2
@@ -54,15 +54,17 @@ class ElementsLook(Look):
     def faults(self, scene: ElementsScene) -> Faults:
         """What does not fit the look: exemplar, coarse motion, domain."""
         exemplar, coarse = scene.exemplar, scene.coarse
-        if self.kind not in exemplar.looks:
-            yield "render.kind", f'"{self.kind}" draws no {exemplar.kind}: say "{exemplar.looks[0]}"'
+        if not self.draws_exemplar(exemplar):
+            other = next(look for look in get_args(Render) if look.draws_exemplar(exemplar))
+            yield "render.kind", f'"{self.kind}" draws no {exemplar.kind}: say "{kind_of(other)}"'
         if getattr(exemplar, "captured", False) and self.draws != "none":
             yield "exemplar.captured", f"is for points, not for {self.kind}"
         if scene.frames < self.fewest_frames:
             yield "frames", f"an animation of {self.kind} has {self.fewest_frames} or more, not {scene.frames}"
         if self.draws != "none":
-            if coarse is None or coarse.kind not in self.carried_by:
-                kinds = ", ".join(self.carried_by)
+            fitting = [motion for motion in get_args(Carried) if motion.topology in (None, self.draws)]
+            if type(coarse) not in fitting:
+                kinds = ", ".join(map(kind_of, fitting))
                 yield "coarse" if coarse is None else "coarse.kind", f"of {self.kind} is one of {kinds}"
             return
         if coarse is not None and not scene.flows:
@@ -70,6 +72,11 @@ class ElementsLook(Look):
         if scene.dimension != self.dimension:
             yield "elements.size", f"is {listed(scene.cells)}; {self.kind} " + (
                 "lie in the plane" if self.dimension == 2 else "needs three numbers: it is in space")
+
+    @classmethod
+    def draws_exemplar(cls, exemplar: ExemplarTable) -> bool:
+        """Whether it draws an exemplar of this kind."""
+        return exemplar.topology in (None, cls.draws) and exemplar.dimension in (None, cls.dimension)
 
     def radius(self, scene: ElementsScene) -> float | None:
         """Of an element of the middle size, heights; None: as the exemplar has it."""
@@ -141,13 +148,13 @@ class ElementsLook(Look):
         from render.studio import Shot
 
         example, edge = inputs.read("exemplar"), scene.figure.panel // 2
-        seen: dict[int, np.ndarray] = {}
+        picture: np.ndarray | None = None
         for frame in frames:
-            at = (frame - 1) % example.frames
-            if at not in seen:
+            if picture is None or example.frames > 1:  # what is at rest is rendered once
                 shot = Shot(edge, edge, max(1, round(INSET * self.spp)), scene.seed, time=frame / scene.fps)
-                seen = {at: self.inset(self.arrays(scene, example, at, exemplar=True), example, shot)}
-            yield frame, seen[at]
+                mesh = self.arrays(scene, example, (frame - 1) % example.frames, exemplar=True)
+                picture = self.inset(mesh, example, shot)
+            yield frame, picture
 
     def make_coarse_picture(self, scene: ElementsScene, inputs: Inputs, frames: list[int],
                             ) -> Iterator[tuple[int, np.ndarray]]:
@@ -163,9 +170,9 @@ class ElementsLook(Look):
         """The meshes, the USD file, and the pictures that the figure shows."""
         output: Any = (("elements", "once"),)
         made = [
-            Artifact("mesh", "bake", meshes.MESH, self.mesh_reads, output, self.make_mesh),
-            Artifact("animation", "bake", usd.ANIMATION, self.mesh_reads, output, self.make_animation, animated=False,
-                     export=True),
+            Artifact("mesh", "bake", meshes.MESH, ("render.kind", *self.mesh_reads), output, self.make_mesh),
+            Artifact("animation", "bake", usd.ANIMATION, ("render.kind", *self.mesh_reads), output,
+                     self.make_animation, animated=False, export=True),
             Artifact("beauty", "render", images.LIGHT, ("render", "seed", "fps", *self.beauty_reads),
                      (("mesh", "same"), *output, *solid_input(scene)), self.make_beauty)]
         reads = ("render", "figure.panel", "seed", "fps", *self.mesh_reads)
@@ -178,6 +185,12 @@ class ElementsLook(Look):
                         Artifact("coarse-picture", "render", images.LIGHT, reads, (("coarse", "once"),),
                                  self.make_coarse_picture))
         return tuple(made)
+
+
+def kind_of(table: type[Any]) -> str:
+    """The kind of a table, as a scene says it."""
+    kind: str = get_args(table.model_fields["kind"].annotation)[0]
+    return kind
 
 
 def extent_of(elements: Elements) -> np.ndarray:
@@ -311,7 +324,6 @@ class NoodlesRender(ElementsLook):
     """Noodles on a plate."""
 
     draws: ClassVar[Literal["none", "thread", "sheet"]] = "thread"
-    carried_by: ClassVar[tuple[str, ...]] = ("lifted", "tracks")
     default_size: ClassVar[float] = 0.38
 
     kind: Literal["noodles"] = key("noodles in a studio")
@@ -347,7 +359,6 @@ class PaperRender(ElementsLook):
     """Sheets of paper in the air."""
 
     draws: ClassVar[Literal["none", "thread", "sheet"]] = "sheet"
-    carried_by: ClassVar[tuple[str, ...]] = ("gust", "tracks")
     default_size: ClassVar[float] = 0.02
     mesh_reads: ClassVar[Reads] = ("render.colour", "seed")
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field, Strict
+from pydantic import Field, Strict
 
 from pipeline.flow import SceneInFlow
-from pipeline.tables import FigureTable, Grid, Share, Table, Vector, Width, grid, key, several
+from pipeline.tables import FigureTable, Grid, Radius, Share, Table, Vector, Width, grid, key
 
 
 class Direction(Table):
@@ -71,7 +71,7 @@ class Source(Table):
     kind: Literal["ball", "box"] = key("form of the source", "ball")
     centre: Annotated[tuple[float, ...], Strict(False)] = key(
         "(x, y) or (x, y, z)", (0.0, 0.1), "heights", min_length=2, max_length=3)
-    radius: Annotated[tuple[Annotated[float, Field(gt=0, le=10)], ...], Strict(False), BeforeValidator(several)] = key(
+    radius: Radius = key(
         "radius of the ball, or half the edge of the box; one number, or one for each axis", (0.08,), "heights",
         min_length=1, max_length=3)
     softness: float = key("share of the radius over which the edge fades", 0.3, ge=0, le=1)

@@ -6,46 +6,20 @@ import sys
 from pathlib import Path
 
 import pytest
+from tiny import SMOKE, written
 
 from pipeline import cli, stages
 from pipeline.errors import EnvironmentMissing, StorageFailed, Terminated
 
 FLOWLOOM = [sys.executable, "-P", "-m", "pipeline.cli"]
-SCENE = """\
-title = "Stripes in a shear"
-source = "a test"
-frames = 2
-[exemplar]
-kind = "stripes"
-size = 8
-[coarse]
-kind = "analytic"
-flow = "shear"
-size = [8, 8]
-[detail]
-size = [8, 8]
-iterations = 1
-neighborhoods = [5]
-[combine]
-omega = 0.5
-[density]
-m = 1
-[render]
-kind = "ink"
-width = 16
-[figure]
-panel = 16
-[quick]
-frames = 1
-"""
+SCENE = SMOKE + "[quick]\nframes = 1\n"
 
 
 @pytest.fixture
 def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A scene in the working directory."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "tiny.toml").write_text(SCENE)
-    return Path("tiny.toml")
+    return written(Path(), SCENE)
 
 
 def line(capsys: pytest.CaptureFixture[str]) -> str:
@@ -61,12 +35,13 @@ def test_help_names_every_command_and_loads_nothing_heavy() -> None:
             "sys.exit(str(heavy & set(sys.modules)) if heavy & set(sys.modules) else 0)")
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    for command in ("synth", "bake", "render", "figure", "diff", "references", "list", "doctor", "gallery", "farm"):
+    for command in ("synth", "bake", "render", "figure", "diff", "references", "list", "doctor", "gallery", "schema",
+                    "farm"):
         assert f"\n  {command} " in done.stdout.replace("│", " "), command
 
 
 def test_every_command_has_its_own_help(capsys: pytest.CaptureFixture[str]) -> None:
-    for command in ("synth", "bake", "render", "figure", "farm", "list"):
+    for command in ("synth", "bake", "render", "figure", "farm", "list", "schema"):
         assert cli.run([command, "--help"]) == 0
         assert f"flowloom {command}" in capsys.readouterr().out
 
@@ -98,7 +73,7 @@ def test_frames_choose_the_frames(scene: Path) -> None:
     (["snyth", "tiny.toml"], 'Did you mean "synth"'),
     (["synth", "tiny.toml", "--quik"], "--quik"),
     (["synth", "none.toml"], "none.toml: no such scene"),
-    (["bake", "tiny.toml", "--frames", "3"], "--frames: '3' is not within 1-2"),
+    (["bake", "tiny.toml", "--frames", "4"], "--frames: '4' is not within 1-3"),
     (["bake", "tiny.toml", "--frames", "x"], "--frames: 'x' is not a range"),
     (["bake", "tiny.toml", "--frames", ""], "--frames: '' is not a range"),
     (["bake", "tiny.toml", "--frames", "1"], "run flowloom synth"),
@@ -149,7 +124,7 @@ def test_what_is_foreseen_is_one_line_with_its_own_code(scene: Path, monkeypatch
     assert expected in line(capsys)
 
 
-@pytest.mark.parametrize("error", [RuntimeError("a bug"), ImportError("no name", name="pipeline.fields"), OSError("?")])
+@pytest.mark.parametrize("error", [RuntimeError("a bug"), ImportError("no name", name="pipeline.flow"), OSError("?")])
 def test_what_is_not_foreseen_shows_its_traceback_and_is_no_other_code(
         scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: Exception) -> None:
     def fail(*_: object) -> None:
@@ -183,7 +158,7 @@ def test_list_tells_scenes_and_marks_finished_and_broken_ones(scene: Path, capsy
     Path("out/tiny/tiny.png").touch()
     assert cli.run(["list", "."]) == 0
     assert capsys.readouterr().out.splitlines() == [
-        "! broken  broken.toml: title: should be a valid string, not 3", "* tiny    Stripes in a shear (a test)"]
+        "! broken  broken.toml: title: should be a valid string, not 3", "* tiny    A tiny circle (a test)"]
 
 
 def test_list_without_a_folder_tells_the_projects_scenes(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -202,7 +177,7 @@ def test_a_closed_pipe_is_no_error(scene: Path) -> None:
 def test_the_farm_prints_its_commands_in_steps(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["farm", str(scene), "--batch", "1", "--dry-run", "--quiet"]) == 0
     steps = [step.splitlines() for step in capsys.readouterr().out.split("\n\n")]
-    assert [len(step) for step in steps] == [1, 2, 2, 1]
+    assert [len(step) for step in steps] == [1, 3, 3, 1]
     assert steps[1][0].endswith("bake tiny.toml --out out --frames 1")
     assert not Path("out").exists()
 

@@ -58,7 +58,7 @@ def test_one_line_each_and_exit_code_3(trials: ModuleType, monkeypatch: pytest.M
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == ["ok", "MISSING", "MISSING"]
     assert lines[0].endswith("a device")
-    assert lines[1].endswith("the reason; to mend it: apt-get install x")
+    assert lines[1].endswith("the reason; to fix it: apt-get install x")
 
 
 def test_this_machine_is_well(capsys: pytest.CaptureFixture[str]) -> None:
@@ -75,7 +75,7 @@ def test_no_opencl_and_only_old_llvm_are_said(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("OCL_ICD_VENDORS", "/nowhere")
     works, told = doctor.tried(by_name["OpenCL"])
     assert not works and "OpenCL" in told
-    assert "pocl-opencl-icd" in by_name["OpenCL"].mending
+    assert "pocl-opencl-icd" in by_name["OpenCL"].remedy
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/usr/lib/x86_64-linux-gnu/libLLVM-15.so.1")
     works, told = doctor.tried(by_name["Mitsuba, LLVM"])
     assert not works and "LLVM 15 is too old" in told and "libllvm19" in told

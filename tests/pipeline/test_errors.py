@@ -10,10 +10,10 @@ from pipeline.errors import (
     BadInput,
     EnvironmentMissing,
     FlowloomError,
+    InvalidValue,
     StorageFailed,
     Terminated,
-    WrongValue,
-    blaming,
+    attributed_to,
 )
 
 
@@ -55,12 +55,12 @@ def test_termination_passes_whoever_catches_every_exception() -> None:
 
 
 def test_the_innermost_key_is_to_blame_and_what_names_a_file_stays_as_it_is() -> None:
-    with pytest.raises(WrongValue, match="too large") as caught, blaming("outer"), blaming("outer.inner"):
+    with pytest.raises(InvalidValue, match="too large") as caught, attributed_to("outer"), attributed_to("outer.inner"):
         raise ValueError("too large")
     assert caught.value.key == "outer.inner"
     bad = BadInput("a.csv", "file", "is empty")
-    with pytest.raises(BadInput) as passed, blaming("outer"):
+    with pytest.raises(BadInput) as passed, attributed_to("outer"):
         raise bad
     assert passed.value is bad
-    with pytest.raises(TypeError), blaming("outer"):
+    with pytest.raises(TypeError), attributed_to("outer"):
         raise TypeError("a fault of ours")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_cli import SCENE
+from tiny import SMOKE, changed, written
 
 from pipeline import farm
 from pipeline.errors import BadInput
@@ -45,13 +45,12 @@ def shell(script: str) -> list[str]:
 
 def made(folder: Path, text: str, batch: int, quick: bool = False) -> list[list[list[str]]]:
     """The steps of a scene with `text`, without what starts python."""
-    (folder / "tiny.toml").write_text(text)
-    steps = farm.steps(folder / "tiny.toml", batch, quick, folder / "my out")
+    steps = farm.steps(written(folder, text), batch, quick, folder / "my out")
     return [[command[command.index("pipeline.cli") + 1:] for command in step] for step in steps]
 
 
 def test_the_batches_cover_every_frame_once_and_the_last_is_what_is_left(tmp_path: Path) -> None:
-    steps = made(tmp_path, SCENE.replace("frames = 2", "frames = 5"), 2)
+    steps = made(tmp_path, changed(SMOKE, "frames = 3", "frames = 5"), 2)
     assert [[command[0] for command in step] for step in steps] == [
         ["synth"], ["bake"] * 3, ["render"] * 3, ["figure"]]
     for step in steps[1:3]:
@@ -60,27 +59,27 @@ def test_the_batches_cover_every_frame_once_and_the_last_is_what_is_left(tmp_pat
 
 
 def test_a_batch_as_long_as_the_animation_is_one_process(tmp_path: Path) -> None:
-    assert [len(step) for step in made(tmp_path, SCENE, 2)] == [1, 1, 1, 1]
+    assert [len(step) for step in made(tmp_path, SMOKE, 3)] == [1, 1, 1, 1]
 
 
 def test_quick_has_its_own_frames_and_every_command_is_told(tmp_path: Path) -> None:
-    steps = made(tmp_path, SCENE, 1, quick=True)
+    text = SMOKE + "[quick]\nframes = 1\n"
+    steps = made(tmp_path, text, 1, quick=True)
     assert [len(step) for step in steps] == [1, 1, 1, 1]
     assert all("--quick" in command for step in steps for command in step)
-    assert not [command for step in made(tmp_path, SCENE, 1) for command in step if "--quick" in command]
+    assert not [command for step in made(tmp_path, text, 1) for command in step if "--quick" in command]
 
 
 def test_the_longest_variant_says_how_many_frames_there_are(tmp_path: Path) -> None:
     variants = '[variants]\n"short" = { frames = 1 }\n"long" = { frames = 4 }\n"usual" = {}\n'
-    assert [len(step) for step in made(tmp_path, SCENE + variants, 1)] == [1, 4, 4, 1]
+    assert [len(step) for step in made(tmp_path, SMOKE + variants, 1)] == [1, 4, 4, 1]
 
 
 def test_a_printed_command_survives_a_shell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "tiny.toml").write_text(SCENE)
-    out = tmp_path / "it's my out"
-    farm.run(tmp_path / "tiny.toml", 2, 10, False, out, False, dry_run=True)
+    file, out = written(tmp_path), tmp_path / "it's my out"
+    farm.run(file, 2, 10, False, out, False, dry_run=True)
     printed = [shlex.split(line) for line in capsys.readouterr().out.splitlines() if line]
-    assert printed == [command for step in farm.steps(tmp_path / "tiny.toml", 10, False, out) for command in step]
+    assert printed == [command for step in farm.steps(file, 10, False, out) for command in step]
     assert not out.exists()
 
 

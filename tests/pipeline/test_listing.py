@@ -3,28 +3,28 @@
 from pathlib import Path
 
 import pytest
-from test_cli import SCENE
+from tiny import SMOKE, changed, written
 
 from pipeline import listing
 from pipeline.errors import BadInput
-from pipeline.schema import PROJECT_SCENES
+from pipeline.tables import PROJECT_SCENES
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Two scenes, one broken one between them, and a file that is none."""
-    (tmp_path / "a.toml").write_text(SCENE)
-    (tmp_path / "broken.toml").write_text("title = ")
-    (tmp_path / "long-name.toml").write_text(SCENE.replace('source = "a test"\n', ""))
+    written(tmp_path, SMOKE, "a.toml")
+    written(tmp_path, "title = ", "broken.toml")
+    written(tmp_path, changed(SMOKE, 'source = "a test"\n', ""), "long-name.toml")
     (tmp_path / "notes.txt").write_text("no scene")
     return tmp_path
 
 
 def test_every_scene_has_its_line_and_a_broken_one_hides_no_other(folder: Path) -> None:
     first, broken, last = listing.lines(folder, folder / "out")
-    assert first == "  a          Stripes in a shear (a test)"
+    assert first == "  a          A tiny circle (a test)"
     assert broken.startswith(f"! broken     {folder / 'broken.toml'}: is not TOML: ")
-    assert last == "  long-name  Stripes in a shear"
+    assert last == "  long-name  A tiny circle"
 
 
 @pytest.mark.parametrize(("file", "marked"), [
@@ -45,7 +45,7 @@ def test_a_star_means_that_this_scenes_figure_is_there(folder: Path, file: str, 
 
 def test_a_title_is_that_of_the_first_variant(folder: Path) -> None:
     variants = '[variants]\n"one" = { title = "First" }\n"two" = { title = "Second" }\n'
-    (folder / "a.toml").write_text(SCENE + variants)
+    written(folder, SMOKE + variants, "a.toml")
     assert next(listing.lines(folder, folder / "out")) == "  a          First (a test)"
 
 

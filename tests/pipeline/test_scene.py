@@ -2,12 +2,17 @@
 
 import os
 from pathlib import Path
+from typing import get_args
 
 import pytest
+from tiny import BEADS, changed, complaint, written
 
-from pipeline import schema
-from pipeline.errors import BadInput
-from pipeline.scene import folder_name, load
+from pipeline.build.graph import folder_name
+from pipeline.build.method import Method
+from pipeline.methods import METHODS
+from pipeline.scene import load
+from pipeline.schema import branches
+from pipeline.tables import PROJECT_SCENES
 
 GOOD = """\
 title = "A small heart"
@@ -30,25 +35,8 @@ width = 64
 """
 
 
-def written(folder: Path, text: str = GOOD, name: str = "tiny.toml") -> Path:
-    """A scene file with `text`."""
-    file = folder / name
-    file.write_text(text)
-    return file
-
-
-def complaint(file: Path) -> str:
-    """The line that loading `file` ends with."""
-    with pytest.raises(BadInput) as caught:
-        load(file)
-    line = str(caught.value)
-    assert line.startswith(f"{file}: ")
-    assert "\n" not in line
-    return line.removeprefix(f"{file}: ")
-
-
 def test_a_good_scene_is_read_with_its_defaults(tmp_path: Path) -> None:
-    scene = load(written(tmp_path)).variants[""]
+    scene = load(written(tmp_path, GOOD)).variants[""]
     assert scene.exemplar.kind == "heart"
     assert scene.detail.size == (32, 32)
     assert scene.detail.neighborhoods == (17, 9)
@@ -56,7 +44,7 @@ def test_a_good_scene_is_read_with_its_defaults(tmp_path: Path) -> None:
 
 
 def test_quick_overrides_apply_only_when_asked_for(tmp_path: Path) -> None:
-    file = written(tmp_path)
+    file = written(tmp_path, GOOD)
     assert load(file).variants[""].detail.size == (32, 32)
     assert load(file, quick=True).variants[""].detail.size == (16, 16)
 
@@ -111,8 +99,7 @@ def test_quick_overrides_apply_only_when_asked_for(tmp_path: Path) -> None:
     ("frames = 4", "frames = 4\nframes = 5", "is not TOML: "),
 ])
 def test_what_is_wrong_is_named_in_one_line(tmp_path: Path, old: str, new: str, expected: str) -> None:
-    assert old in GOOD
-    assert complaint(written(tmp_path, GOOD.replace(old, new, 1))).startswith(expected)
+    assert complaint(written(tmp_path, changed(GOOD, old, new))).startswith(expected)
 
 
 SOLID = """\
@@ -221,6 +208,60 @@ def test_variants_are_checked_as_strictly(tmp_path: Path, tables: str, expected:
     assert complaint(written(tmp_path, f"{GOOD}{tables}\n")).startswith(expected)
 
 
+ONE_FIGURE = GOOD + '[variants."first"]\n[variants."other"]\n'
+
+
+@pytest.mark.parametrize(("line", "expected"), [
+    ('"figure.frame" = 2', '"figure.frame": is 2, and 0 in'),
+    ('"figure.animation" = false', '"figure.animation": is false, and true in'),
+    ('"figure.columns" = 3', '"figure.columns": is 3, and 0 in'),
+    ('"fps" = 12.5', '"fps": is 12.5, and 30 in'),
+    ("figure = { frame = 2 }", '"figure.frame": is 2, and 0 in'),
+])
+def test_variants_that_want_the_one_figure_in_two_ways_are_refused(tmp_path: Path, line: str, expected: str) -> None:
+    assert complaint(written(tmp_path, ONE_FIGURE + line)) == (
+        f'variants."other".{expected} variants."first": a file has one figure')
+
+
+def test_variants_are_of_one_figure_at_their_quick_settings_too(tmp_path: Path) -> None:
+    quick = changed(GOOD, "[quick]\n", '[figure]\nframe = 3\n[quick]\n"figure.frame" = 2\n')
+    assert complaint(written(tmp_path, quick + '[variants."first"]\n[variants."other"]\n"figure.frame" = 3\n')) == (
+        'variants."other"."figure.frame": is 3, and 2 in variants."first": a file has one figure')
+
+
+def test_variants_that_agree_on_their_figure_may_differ_in_the_rest_of_it(tmp_path: Path) -> None:
+    same = '"figure.frame" = 2\n"figure.animation" = false\n'
+    text = GOOD + f'[variants."first"]\n{same}[variants."other"]\n{same}"frames" = 3\n"figure.panel" = 64\n'
+    assert [one.figure.panel for one in load(written(tmp_path, text)).variants.values()] == [512, 64]
+
+
+@pytest.mark.parametrize(("text", "old", "kind", "expected"), [
+    (GOOD, "lit", "lite", "unknown kind 'lite'; did you mean lit?"),
+    (GOOD, "lit", "particle", "unknown kind 'particle'; did you mean particles?"),
+    (GOOD, "lit", "smoke", "unknown kind 'smoke'; known: lit, ink, volume, particles, seaweed, none"),
+    (GOOD, "lit", "beads", "unknown kind 'beads'; known: lit, ink, volume, particles, seaweed, none"),
+    (BEADS, "beads", "bead", "unknown kind 'bead'; did you mean beads?"),
+    (BEADS, "beads", "shoal", "unknown kind 'shoal'; did you mean school?"),
+    (BEADS, "beads", "smoke", "unknown kind 'smoke'; known: beads, school, noodles, paper"),
+    (BEADS, "beads", "lit", "unknown kind 'lit'; known: beads, school, noodles, paper"),
+])
+def test_an_unknown_look_is_an_error_with_a_suggestion(tmp_path: Path, text: str, old: str, kind: str,
+                                                       expected: str) -> None:
+    look = f'[render]\nkind = "{kind}"'
+    assert complaint(written(tmp_path, changed(text, f'[render]\nkind = "{old}"', look))) == f"render.kind: {expected}"
+    variant = text + f'[variants."first"]\n[variants."other"]\n"render.kind" = "{kind}"\n'
+    assert complaint(written(tmp_path, variant)) == f'variants."other"."render.kind": {expected}'
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_every_look_draws_its_own_picture_and_none_falls_back_to_smoke(method: Method) -> None:
+    for look in branches(method.scene.model_fields["render"].annotation):
+        kinds = get_args(look.model_fields["kind"].annotation)
+        assert len(kinds) == 1
+        drawn = {name for name in vars(look) if name == "picture" or name.startswith("make_")}
+        assert drawn or kinds == ("none",), f"{kinds[0]} has the picture of another look"
+
+
 def test_an_override_may_replace_a_whole_table(tmp_path: Path) -> None:
     text = GOOD + '[variants.noise]\ncoarse = { kind = "curl-noise", size = [16, 16], speed = 0.5 }\n'
     assert load(written(tmp_path, text)).variants["noise"].coarse.kind == "curl-noise"
@@ -244,7 +285,7 @@ def test_files_stand_in_the_scenes_folder_or_the_projects_assets(tmp_path: Path)
     scene = load(written(tmp_path, bitmap('"deep/mine.png"'))).variants[""]
     assert scene.exemplar.file == tmp_path / "deep" / "mine.png"
     scene = load(written(tmp_path, bitmap('"assets/lightning.png"'))).variants[""]
-    assert scene.exemplar.file == schema.PROJECT_SCENES / "assets" / "lightning.png"
+    assert scene.exemplar.file == PROJECT_SCENES / "assets" / "lightning.png"
 
 
 @pytest.mark.parametrize(("file", "expected"), [
@@ -293,7 +334,7 @@ def test_what_is_not_toml_is_refused_in_one_line(tmp_path: Path, content: bytes)
 
 @pytest.mark.parametrize("name", ["Tiny.toml", "tiny.json", "a b.toml", "-a.toml"])
 def test_a_scenes_name_is_a_plain_name(tmp_path: Path, name: str) -> None:
-    assert "a scene's name has" in complaint(written(tmp_path, name=name))
+    assert "a scene's name has" in complaint(written(tmp_path, GOOD, name))
 
 
 def test_a_missing_scene_is_bad_input(tmp_path: Path) -> None:

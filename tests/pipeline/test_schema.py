@@ -1,172 +1,144 @@
-"""scenes/README.md documents every table and key of the schemas; `python tests/test_schema.py` writes its tables."""
+"""What is written of scenes: scenes/README.md documents every key, and the JSON Schema checks what an editor shows."""
 
+import json
 import re
-import types
-import typing
+import tomllib
 from pathlib import Path
 
 import pytest
-from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
+from jsonschema import Draft202012Validator
 from pydantic import BaseModel
-from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
+from tiny import BEADS, FISH, NOODLES, PAPER, SMOKE, changed
 
-from pipeline import elements_schema, schema
+from pipeline import cli, schema
+from pipeline.build.method import Method
+from pipeline.listing import project_scenes
+from pipeline.methods import METHODS
 
-README = schema.PROJECT_SCENES / "README.md"
-BY = "written by tests/test_schema.py"
-
-HEAD = ("| key | what | type and range | unit | default |", "|---|---|---|---|---|")
-
-
-def branches(annotation: object) -> list[type[BaseModel]]:
-    """The tables among the types that `annotation` allows."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [table for part in typing.get_args(annotation) for table in branches(part)]
-
-
-def tables(model: type[BaseModel] = schema.Scene, path: str = "") -> list[tuple[str, type[BaseModel]]]:
-    """(dotted path, table) of the schema, depth first, each table once."""
-    found = [(path, model)]
-    for name, field in model.model_fields.items():
-        for table in branches(field.annotation):
-            found += [(at, one) for at, one in tables(table, f"{path}.{name}" if path else name)
-                      if one not in [known for _, known in found]]
-    return found
+TABLES = [(path, model) for method in METHODS for path, model in schema.tables(method.scene)]
 
 
 def shared() -> dict[type[BaseModel], str]:
-    """The tables that both kinds of scene have, and their paths in the first."""
-    there = {model for _, model in tables(elements_schema.ElementsScene)}
-    return {model: path for path, model in tables() if model in there}
+    """The tables that both methods have, and their paths in the first."""
+    first, second = (schema.tables(method.scene) for method in METHODS)
+    there = {model for _, model in second}
+    return {model: path for path, model in first if model in there}
 
 
-def limits(metadata: object) -> str:
-    """The range that a field's metadata demand: [0, 1], (0, 1] …"""
-    low, high = "", ""
-    for limit in metadata:
-        if isinstance(limit, Ge | Gt):
-            low = f"[{limit.ge}" if isinstance(limit, Ge) else f"({limit.gt}"
-        if isinstance(limit, Le | Lt):
-            high = f"{limit.le}]" if isinstance(limit, Le) else f"{limit.lt})"
-    return f"{low}, {high}" if low and high else ""
+# -- scenes/README.md
 
 
-def spelled(annotation: object, metadata: object = ()) -> str:
-    """A type in the reader's words: integer [1, 50], "lit", array of 2 integers [4, 4096] …"""
-    origin, parts = typing.get_origin(annotation), typing.get_args(annotation)
-    if origin is typing.Annotated:
-        inner = [m for part in parts[1:] for m in (part.metadata if isinstance(part, FieldInfo) else [part])]
-        return spelled(parts[0], [*inner, *metadata])
-    if origin is typing.Literal:
-        return " · ".join(f'`"{value}"`' for value in parts)
-    if origin in (typing.Union, types.UnionType):
-        return " or ".join(dict.fromkeys(spelled(part, metadata) for part in parts if part is not type(None)))
-    if origin is tuple:
-        shortest = next((m.min_length for m in metadata if isinstance(m, MinLen)), 0)
-        longest = next((m.max_length for m in metadata if isinstance(m, MaxLen)), "any")
-        count = f"{shortest} to {longest}" if shortest != longest else f"{shortest}"
-        count = count if parts[-1] is Ellipsis else f"{len(parts)}"
-        return f"array of {count}: {spelled(parts[0])}"
-    name = {int: "integer", float: "number", str: "text", bool: "true or false", Path: "file"}.get(annotation, "table")
-    return f"{name} {limits(metadata)}".strip()
+@pytest.mark.parametrize("place", [f"tables of {method.name}" for method in METHODS])
+def test_the_readme_documents_every_table_and_key_as_the_schema_has_them(place: str) -> None:
+    written = schema.around(place, schema.README.read_text())[1]
+    assert written == schema.documentation()[place].strip(), "type: flowloom schema --write"
 
 
-def default(field: FieldInfo) -> str:
-    """What a key is if it is left out."""
-    value = field.default
-    if field.default_factory:
-        flat, deep = (field.default_factory({"size": size}) for size in ((8, 8), (8, 8, 8)))
-        return f"{spelled_value(flat)}, in 3-D {spelled_value(deep)}"
-    if value is PydanticUndefined:
-        return "needed"
-    if value is None:
-        return "none"
-    if isinstance(value, BaseModel) or (isinstance(value, tuple) and value and isinstance(value[0], BaseModel)):
-        return "as below"
-    return spelled_value(value)
-
-
-def spelled_value(value: object) -> str:
-    """A value as one writes it in a scene."""
-    text = {True: "true", False: "false"}.get(value) if isinstance(value, bool) else None
-    if isinstance(value, str):
-        text = f'"{value}"'
-    if isinstance(value, tuple):
-        text = "[" + ", ".join(f'"{v}"' if isinstance(v, str) else f"{v:g}" for v in value) + "]"
-    return f"`{text or f'{value:g}'}`"
-
-
-def row(name: str, field: FieldInfo) -> str:
-    """One key as a row of a Markdown table."""
-    unit = (field.json_schema_extra or {}).get("unit", "")
-    description = field.description or "a table, see below"
-    return f"| `{name}` | {description} | {spelled(field.annotation, field.metadata)} | {unit} | {default(field)} |"
-
-
-def heading(path: str, model: type[BaseModel]) -> str:
-    """What a table is called: its path, and the kinds that this form of it is for."""
-    kind = model.model_fields.get("kind")
-    kinds = ", ".join(f'"{k}"' for k in typing.get_args(kind.annotation)) if kind and "." not in path else ""
-    return (f"[{path}]" if path else "Top of the file") + (f" kind = {kinds}" if kinds else "")
-
-
-def table_of(path: str, model: type[BaseModel]) -> str:
-    """A table in Markdown."""
-    purpose = " ".join((model.__doc__ or "").split())
-    rows = [row(name, field) for name, field in model.model_fields.items()]
-    return "\n".join([f"### {heading(path, model)}", "", purpose, "", *HEAD, *rows, ""])
-
-
-def documentation() -> dict[str, str]:
-    """The tables of both kinds of scene in Markdown, by the name of their place in the README; what is shared stands
-    in the first and is named in the second."""
-    also = [f"`{heading(path, model)}`" for model, path in shared().items()]
-    return {
-        "tables": "\n".join(table_of(path, model) for path, model in tables()),
-        "tables of elements": "\n".join([
-            *(table_of(path, model) for path, model in tables(elements_schema.ElementsScene) if model not in shared()),
-            f"As above, what is said of detail.size there being meant of elements.size: {', '.join(also)}."])}
-
-
-def around(name: str, text: str) -> tuple[str, str, str]:
-    """What stands in a text before a place of the README, in it and after it."""
-    before, rest = text.split(f"<!-- {name}: {BY} -->")
-    inside, after = rest.split(f"<!-- end of {name} -->")
-    return before, inside.strip(), after
-
-
-@pytest.mark.parametrize(("name", "content"), documentation().items())
-def test_the_readme_documents_every_table_and_key_as_the_schema_has_them(name: str, content: str) -> None:
-    assert around(name, README.read_text())[1] == content.strip(), "type: .venv/bin/python tests/test_schema.py"
+def test_each_method_has_its_place_and_no_place_is_left_over() -> None:
+    places = re.findall(rf"<!-- (.*): {schema.BY} -->", schema.README.read_text())
+    assert places == list(schema.documentation()) == [f"tables of {method.name}" for method in METHODS]
 
 
 def test_what_both_kinds_of_scene_have_is_documented_once() -> None:
     names = {model.__name__ for model in shared()}
     assert {"NoiseMotion", "FileMotion", "ShapeObstacle", "MeshObstacle"} <= names
-    written = README.read_text().splitlines()
+    written = schema.README.read_text().splitlines()
     for model, path in shared().items():
-        assert written.count(f"### {heading(path, model)}") == 1
+        assert written.count(f"### {schema.heading(path, model)}") == 1
+        assert f"`{schema.heading(path, model)}`" in schema.documentation()["tables of ma13"].splitlines()[-1]
 
 
-@pytest.mark.parametrize(("path", "model"), [*tables(), *tables(elements_schema.ElementsScene)])
+@pytest.mark.parametrize(("path", "model"), TABLES)
 def test_every_number_has_a_range_and_every_key_a_description(path: str, model: type[BaseModel]) -> None:
     for name, field in model.model_fields.items():
-        assert field.description or branches(field.annotation), f"{path}.{name} is not described"
-        said = spelled(field.annotation, field.metadata)
+        assert field.description or list(schema.branches(field.annotation)), f"{path}.{name} is not described"
+        said = schema.spelled(field.annotation, field.metadata)
         bare = re.search(r"\b(integer|number)(?! [\[(])", said)
         assert not bare or name == "centre", f"{path}.{name} has no range: {said}"
 
 
 def test_every_table_refuses_what_it_does_not_know() -> None:
-    for _, model in [*tables(), *tables(elements_schema.ElementsScene)]:
+    for _, model in TABLES:
         config = model.model_config
         assert (config["extra"], config["strict"], config["frozen"], config["allow_inf_nan"]) == (
             "forbid", True, True, False)
 
 
-if __name__ == "__main__":
-    for name, content in documentation().items():
-        before, _, after = around(name, README.read_text())
-        README.write_text(f"{before}<!-- {name}: {BY} -->\n\n{content}\n<!-- end of {name} -->{after}")
+# -- the JSON Schema
+
+
+def test_the_json_schema_is_written_as_the_models_have_it() -> None:
+    assert schema.SCHEMA.read_text() == schema.json_schema() + "\n", "type: flowloom schema --write"
+
+
+def test_it_is_a_json_schema_of_the_draft_that_it_names() -> None:
+    document = json.loads(schema.json_schema())
+    assert document["$schema"] == Draft202012Validator.META_SCHEMA["$id"]
+    Draft202012Validator.check_schema(document)
+
+
+def test_the_command_prints_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(schema.SCHEMA.read_text())
+
+
+def test_write_mends_both_files_and_leaves_the_rest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = schema.README.read_text()
+    row = next(line for line in whole.splitlines() if line.startswith("| `seed` |"))
+    (tmp_path / "README.md").write_text(changed(whole, row, "| `seed` | out of date |"))
+    monkeypatch.setattr(schema, "README", tmp_path / "README.md")
+    monkeypatch.setattr(schema, "SCHEMA", tmp_path / "scene.schema.json")
+    assert cli.run(["schema", "--write"]) == 0
+    assert (tmp_path / "README.md").read_text() == whole
+    assert json.loads((tmp_path / "scene.schema.json").read_text()) == json.loads(schema.json_schema())
+
+
+def faults(text: str) -> list[str]:
+    """What an editor would mark in a scene."""
+    raw = tomllib.loads(text)
+    found = Draft202012Validator(json.loads(schema.SCHEMA.read_text())).iter_errors(raw)
+    return [error.message for error in found]
+
+
+@pytest.mark.parametrize("file", project_scenes(), ids=lambda file: file.stem)
+def test_the_projects_scenes_are_valid(file: Path) -> None:
+    assert faults(file.read_text()) == []
+
+
+@pytest.mark.parametrize("text", [SMOKE, BEADS, FISH, NOODLES, PAPER])
+def test_a_scene_is_valid_and_what_load_refuses_of_a_key_is_not(text: str) -> None:
+    assert faults(text) == []
+    assert faults(changed(text, "[render]", '[quick]\n"frames" = 1\n[variants.a]\n"seed" = 2\n[render]')) == []
+    kind = re.search(r'\[render\]\nkind = "(.*)"', text)
+    assert kind
+    for old, new in (
+            ("frames = 3", "frame = 3"),  # a misspelt key, at the top
+            ("width = 32", "widht = 32"),  # in a table
+            (f'[render]\nkind = "{kind[1]}"', '[render]\nkind = "seewead"'),  # a wrong kind
+            (f'[render]\nkind = "{kind[1]}"', "[render]"),  # none
+            ("width = 32", 'width = "wide"'),  # a wrong type
+            ("width = 32", "width = 5000"),  # out of range
+            ("frames = 3", "frames = 0"),
+            ("iterations = ", "iterations = 900"),
+            ("[render]", "[rendr]")):
+        assert faults(changed(text, old, new)), new
+
+
+@pytest.mark.parametrize(("radius", "valid"), [
+    ("0.1", True), ("[0.1]", True), ("0.0", False), ("11.0", False), ("[-1.0]", False), ("[]", False),
+    ('"wide"', False)])
+def test_one_number_may_stand_for_an_array_within_the_same_range(radius: str, valid: bool) -> None:
+    ball = f'[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = {radius}\n[render]'
+    for text in (SMOKE, BEADS):
+        assert (faults(changed(text, "[render]", ball)) == []) == valid
+    source = f"[[density.sources]]\nradius = {radius}\n[render]"
+    assert (faults(changed(SMOKE, "[render]", source)) == []) == valid
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_a_scene_is_checked_as_one_of_its_method(method: Method) -> None:
+    """A table of another method is unknown, and so is a kind that only the other draws."""
+    text, other = (SMOKE, "beads") if method is METHODS[0] else (BEADS, "lit")
+    assert faults(changed(text, "[render]", "[combined]\n[render]"))
+    kind = re.search(r'\[render\]\nkind = "(.*)"', text)
+    assert kind and faults(changed(text, kind[0], f'[render]\nkind = "{other}"'))

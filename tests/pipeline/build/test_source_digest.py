@@ -19,11 +19,17 @@ from pipeline.build.view import value_at
 
 SOURCE = '''
 """A module of pipeline."""
-from synth import advect
+import functools
+import re
+
+import numpy as np
+
 from pipeline import {other} as other
+from synth import advect
 
 TABLE = {{"a": 1}}
 UNUSED = 5
+BY_NAME = {{"twice": lambda x: 2 * x}}
 
 
 def helper(x: int) -> int:
@@ -33,6 +39,19 @@ def helper(x: int) -> int:
 
 def make(scene, inputs, frames):
     yield 0, helper(1)
+
+
+def chosen(scene, inputs, frames):
+    yield 0, BY_NAME["twice"](1), PATTERN, VALUES, cached(1)
+
+
+PATTERN = re.compile("a")
+VALUES = np.arange(3)
+
+
+@functools.cache
+def cached(x):
+    return x + 1
 
 
 def later(scene, inputs, frames):
@@ -112,6 +131,15 @@ def test_a_method_counts_with_the_methods_that_it_calls_on_its_own_class(tmp_pat
                                                                          counts: bool) -> None:
     before = source_digest.digest([module(tmp_path, SOURCE).Look().drawn])
     assert (source_digest.digest([module(tmp_path, changed(SOURCE, old, new)).Look().drawn]) != before) == counts
+
+
+@pytest.mark.parametrize(("old", "new"), [
+    ("2 * x", "3 * x"), ('"twice": ', '"thrice": '), ('compile("a")', 'compile("b")'), ("arange(3)", "arange(4)"),
+    ("return x + 1", "return x + 2")])
+def test_tables_of_functions_patterns_arrays_and_cached_functions_count(tmp_path: Path, old: str, new: str) -> None:
+    before = source_digest.digest([module(tmp_path, SOURCE).chosen])
+    assert source_digest.digest([module(tmp_path, SOURCE).chosen]) == before, "the same in each process"
+    assert source_digest.digest([module(tmp_path, changed(SOURCE, old, new)).chosen]) != before
 
 
 def test_an_import_inside_a_function_is_followed(tmp_path: Path) -> None:

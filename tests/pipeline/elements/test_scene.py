@@ -3,95 +3,21 @@
 from pathlib import Path
 
 import pytest
-from test_scene import complaint, written
+from tiny import BEADS, FISH, NOODLES, PAPER, TRACKS, changed, complaint, written
 
-from pipeline.elements_schema import ElementsScene
+from pipeline.elements.scene import Scene
 from pipeline.scene import load
-from pipeline.schema import PROJECT_SCENES
-
-BEADS = """\
-title = "Beads that turn"
-frames = 3
-[exemplar]
-kind = "hexagonal-grid"
-across = 6
-[elements]
-size = [32, 32]
-spacing = 0.12
-[coarse]
-kind = "analytic"
-flow = "rotation"
-size = [16, 16]
-[synthesis]
-iterations = 2
-[render]
-kind = "beads"
-width = 32
-spp = 1
-[figure]
-panels = ["result"]
-panel = 32
-"""
-FISH = """\
-title = "A small school"
-frames = 3
-[exemplar]
-kind = "school"
-count = 12
-frames = 8
-[elements]
-size = [16, 16, 16]
-spacing = 0.3
-[synthesis]
-iterations = 1
-[render]
-kind = "school"
-width = 32
-height = 24
-spp = 1
-[figure]
-panels = ["result"]
-panel = 32
-"""
-NOODLES = """\
-title = "A few noodles"
-frames = 3
-[exemplar]
-kind = "noodles"
-style = "jagged"
-frames = 4
-[elements]
-count = 4
-[coarse]
-kind = "lifted"
-[synthesis]
-iterations = 1
-[render]
-kind = "noodles"
-width = 32
-height = 24
-spp = 1
-[figure]
-panels = ["result"]
-panel = 32
-"""
-PAPERS = NOODLES.replace("noodles", "paper").replace("jagged", "folded").replace("lifted", "gust")
-
-
-def changed(text: str, old: str, new: str) -> str:
-    """`text` with the first `old`, which must be there, replaced."""
-    assert old in text
-    return text.replace(old, new, 1)
+from pipeline.tables import PROJECT_SCENES
 
 
 def test_a_table_of_elements_makes_it_a_scene_of_them_with_its_defaults(tmp_path: Path) -> None:
     scene = load(written(tmp_path, BEADS)).variants[""]
-    assert isinstance(scene, ElementsScene)
+    assert isinstance(scene, Scene)
     assert (scene.dimension, scene.shape, scene.flows, scene.seed, scene.fps) == (2, (32, 32), True, 1, 24)
     assert (scene.elements.count, scene.synthesis.neighborhood, scene.synthesis.sequence) == (0, 2.0, "together")
 
 
-@pytest.mark.parametrize("text", [BEADS, FISH, NOODLES, PAPERS])
+@pytest.mark.parametrize("text", [BEADS, FISH, NOODLES, PAPER])
 def test_each_kind_of_element_has_its_scene(tmp_path: Path, text: str) -> None:
     assert load(written(tmp_path, text)).variants[""].frames == 3
 
@@ -130,12 +56,12 @@ ROUND = 'domain = { kind = "ball", centre = CENTRE, radius = 0.3 }'
     (FISH, 'render]\nkind = "school"', 'render]\nkind = "paper"', 'render.kind: "paper" draws no school: say "school"'),
     (NOODLES, '[coarse]\nkind = "lifted"\n', "", "coarse: of noodles is one of lifted, tracks"),
     (NOODLES, '"lifted"', '"gust"', "coarse.kind: of noodles is one of lifted, tracks"),
-    (PAPERS, '"gust"', '"analytic"', "coarse.kind: of papers is one of gust, tracks"),
+    (PAPER, '"gust"', '"analytic"', "coarse.kind: of paper is one of gust, tracks"),
     (BEADS, '"analytic"\nflow = "rotation"\nsize = [16, 16]', '"gust"',
      'coarse.kind: "gust" carries threads or sheets, no beads'),
     (BEADS, "size = [32, 32]", "size = [32, 32, 32]", "elements.size: is 32×32×32; beads lie in the plane"),
     (FISH, "size = [16, 16, 16]", "size = [16, 16]",
-     "elements.size: is 16×16; school is in space: it takes a third number"),
+     "elements.size: is 16×16; school needs three numbers: it is in space"),
     (BEADS, "size = [16, 16]", "size = [16, 24]", "elements.size: 32×32 has not the shape of coarse.size, 16×24"),
     (BEADS, "size = [16, 16]", "size = [16, 16, 16]", "coarse.size: 16×16×16 has not as many axes as elements.size"),
     (BEADS, '"analytic"\nflow = "rotation"', '"wake"', 'coarse.kind: "wake" needs a stone'),
@@ -160,14 +86,14 @@ ROUND = 'domain = { kind = "ball", centre = CENTRE, radius = 0.3 }'
      'synthesis.after: is 0 with sequence = "frames": later frames are not there yet (figure 3)'),
     # what threads and sheets do not heed
     (NOODLES, "count = 4", "pins = [{ at = [0.0, 0.5, 0.0] }]",
-     "elements.pins: is for points; noodles go where their [coarse] is"),
+     "elements.pins: is for points; noodles follow their [coarse] motion"),
     (NOODLES, "count = 4", "toroidal = true", "elements.toroidal: is for points"),
     (NOODLES, "count = 4", ROUND.replace("CENTRE", "[0.0, 0.5]"), "elements.domain: is for points"),
     (NOODLES, "count = 4", 'along = "centre"', "elements.along: is for points"),
-    (PAPERS, "[render]", '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.1\n[render]',
-     "obstacles: is for points; papers go where their [coarse] is"),
-    (PAPERS, "iterations = 1", 'sequence = "frames"',
-     'synthesis.sequence: "frames" is for points; of papers all frames are synthesized together'),
+    (PAPER, "[render]", '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.1\n[render]',
+     "obstacles: is for points; paper follow their [coarse] motion"),
+    (PAPER, "iterations = 1", 'sequence = "frames"',
+     'synthesis.sequence: "frames" is for points; of paper all frames are synthesized together'),
 ])
 def test_what_is_wrong_is_named_in_one_line(tmp_path: Path, text: str, old: str, new: str, expected: str) -> None:
     assert complaint(written(tmp_path, changed(text, old, new))).startswith(expected)
@@ -184,9 +110,6 @@ def test_what_tracks_of_the_users_do_not_go_with(tmp_path: Path, text: str, old:
     if "captured" in new:
         text = changed(text, '"noodles"', '"tracks"')
     assert complaint(written(tmp_path, changed(text, old, new))) == expected
-
-
-TRACKS = changed(changed(BEADS, '"hexagonal-grid"', '"tracks"'), "across = 6", 'file = "FILE"')
 
 
 def test_tracks_may_be_a_folder_whose_files_stay_inside(tmp_path: Path) -> None:
@@ -209,5 +132,5 @@ def test_the_readmes_example_is_a_whole_scene(tmp_path: Path) -> None:
     text = (PROJECT_SCENES / "README.md").read_text().split("## Scenes of elements\n")[1]
     example = [line.removeprefix("    ") for line in text.splitlines() if line.startswith("    ")]
     scene = load(written(tmp_path, "\n".join(example))).variants[""]
-    assert isinstance(scene, ElementsScene)
+    assert isinstance(scene, Scene)
     assert (scene.exemplar.kind, scene.render.kind, scene.flows) == ("hexagonal-grid", "beads", True)

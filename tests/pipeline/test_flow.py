@@ -1,17 +1,23 @@
-"""The obstacles of a scene: what each kind becomes, what is refused in one line, and who hears of them."""
+"""The flow of a scene: L in world units, what each kind of obstacle becomes, what is refused, and who is told of them.
+"""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import tiny
 
-from pipeline import cli, obstacles
+from pipeline import cli, flow
+from pipeline.build.graph import computed
 from pipeline.errors import BadInput
 from pipeline.files import images, meshes, pictures, volumes
+from pipeline.motion.fields import upsampled
 from pipeline.scene import load
 from synth import obstacle
 from synth.field import Field, domain_origin
-from synth.motion.local_axes import local_frame, to_world
+from synth.motion.local_axes import axes_2d, to_world
 from synth.projection import divergence
 
 SCENE = """\
@@ -62,7 +68,8 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def solid(text: str, size: str = "[32, 24]", coarse: str = ANALYTIC) -> np.ndarray:
     """The distance, in cells, that a scene with these obstacles works with."""
     (scene,) = load(written(text, size=size, coarse=coarse)).variants.values()
-    ((_, field),) = obstacles.make_solid(scene, None, [0])
+    (artifact,) = flow.solid_artifacts(scene)
+    ((_, field),) = computed(artifact, scene, tiny.Memory(Path()), [0])
     assert field.shape == scene.shape and field.origin == domain_origin(scene.shape)
     return field.values * scene.shape[-2]
 
@@ -131,7 +138,7 @@ def ball_mesh(name: str = "ball.ply", radius: float = 0.2, centre: tuple[float, 
 
 @pytest.mark.parametrize("name", ["ball.ply", "ball.obj", "ball.stl"])
 @pytest.mark.parametrize("holes", [0, 1])
-def test_a_mesh_of_a_ball_and_one_that_is_mended(name: str, holes: int) -> None:
+def test_a_mesh_of_a_ball_and_one_that_is_repaired(name: str, holes: int) -> None:
     ball_mesh(name, holes=holes)
     expected = obstacle.ball((24, 32), (0, 0.5), 0.2).distance
     assert near(solid(f'[[obstacles]]\nkind = "mesh"\nfile = "{name}"'), expected) < 0.35
@@ -212,7 +219,7 @@ def test_meshes_that_are_no_obstacle(capsys: pytest.CaptureFixture[str]) -> None
     text = '[[obstacles]]\nkind = "mesh"\nfile = "a.ply"'
     meshes.write(Path("a.ply"), np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
     line = refused(text, capsys)
-    assert "a.ply: obstacles[0].file: is not watertight and cannot be mended: it encloses nothing" in line
+    assert "a.ply: obstacles[0].file: is not watertight and cannot be repaired: it encloses nothing" in line
     ball_mesh("a.ply", radius=500)
     assert "give it a height" in refused(text, capsys)
     ball_mesh("a.ply", centre=(9, 9, 9))
@@ -242,7 +249,7 @@ def test_the_whole_chain_keeps_to_the_wall(coarse: str) -> None:
         slope = np.sqrt(np.mean([np.gradient(motion, axis=a) ** 2 for a in (0, 1)]))
         left = divergence(motion, "wall" if "smoke" in coarse else "open", away)
         assert np.sqrt(np.mean(left**2)) < 1e-4 * slope
-    detail = to_world(H.values, local_frame(motion))
+    detail = to_world(H.values, axes_2d(motion))
     normal = obstacle.outward(away)
     through = np.sum(detail * normal, -1)[np.abs(away) < 0.5]
     assert np.sqrt(np.mean(through**2)) < 0.02 * np.sqrt(np.mean(H.values**2))
@@ -281,7 +288,7 @@ def test_without_the_boundary_the_detail_goes_its_way() -> None:
     assert cli.run(["figure", "tiny.toml"]) == 0
     away = images.read_field(Path("out/tiny/fields/solid.exr")).values * 24
     L, H = (images.read_field(Path(f"out/tiny/fields/{name}.0002.exr")) for name in ("L", "H"))
-    through = np.sum(to_world(H.values, local_frame(L.values)) * obstacle.outward(away), -1)[np.abs(away) < 0.5]
+    through = np.sum(to_world(H.values, axes_2d(L.values)) * obstacle.outward(away), -1)[np.abs(away) < 0.5]
     assert np.sqrt(np.mean(through**2)) > 0.1 * np.sqrt(np.mean(H.values**2))
 
 
@@ -320,7 +327,87 @@ def test_particles_are_baked_drawn_and_resumed() -> None:
     assert images.read_picture(Path("out/tiny/images/beauty.0004.exr")).shape == (24, 32, 3)
 
 
-def test_a_bad_reader_is_blamed_by_its_key() -> None:
+def test_an_error_of_a_reader_names_its_key() -> None:
     Path("latin.svg").write_bytes(b"<svg>\xe9</svg>")
     with pytest.raises(BadInput, match=r"latin\.svg: key: is not an SVG document"):
-        obstacles._drawing(Path("latin.svg"), "key")
+        flow._drawing(Path("latin.svg"), "key")
+
+
+# -- the coarse motion --------------------------------------------------------------------------------------------
+
+
+TINY = 'kind = "analytic"\nflow = "rotation"\nsize = [8, 8]'
+
+
+def coarse_scene(coarse: str, old: str = "", new: str = "") -> Any:
+    """The tiny scene with this coarse motion."""
+    text = tiny.changed(tiny.changed(tiny.SMOKE, TINY, coarse), "frames = 3", "frames = 4")
+    return tiny.scene(Path(), tiny.changed(text, old, new))
+
+
+def motion(scene: Any, frames: Sequence[int], solid: Field | None = None) -> dict[int, Field]:
+    """L of these frames, made by what sees only what it declares."""
+    inputs = tiny.Memory(Path(), **({"solid": solid} if solid else {}))
+    return dict(computed(flow.coarse_artifact(scene), scene, inputs, frames))
+
+
+def test_a_coarse_motion_is_stored_in_world_units_per_second() -> None:
+    constant = TINY.replace("rotation", "constant") + "\nspeed = 0.5"
+    scene = coarse_scene(constant, "frames = 4", "frames = 4\nfps = 24")
+    found = motion(scene, [2, 3])
+    assert sorted(found) == [2, 3]
+    # half a cell of an eighth of the height, 24 times a second
+    np.testing.assert_allclose(found[2].values[..., 0], 0.5 / 8 * 24)
+    np.testing.assert_allclose(upsampled(found[2], scene)[..., 0], 1.0, rtol=1e-6)  # on twice the cells
+
+
+@pytest.mark.parametrize("coarse", ['kind = "smoke"\nsize = [8, 8]\nwarmup = 3', 'kind = "curl-noise"\nsize = [8, 8]'])
+def test_some_frames_of_a_coarse_motion_are_those_of_all(coarse: str) -> None:
+    scene = coarse_scene(coarse)
+    every = motion(scene, [1, 2, 3, 4])
+    assert motion(scene, [3]) == {3: every[3]}
+    assert not np.array_equal(every[2].values, every[3].values)
+
+
+def test_a_coarse_motion_from_a_file_is_placed_on_the_domain() -> None:
+    values = np.full((16, 16, 2), 0.25, np.float32)
+    images.write_field(Path("wind.exr"), Field(values, 3.0, (5.0, 5.0)))
+    found = motion(coarse_scene('kind = "file"\nfile = "wind.exr"'), [1, 4])
+    assert found[1] == found[4] == Field.centred(values, 2)
+
+
+def test_a_coarse_motion_from_a_vdb_is_moved_onto_the_domain_whatever_its_origin() -> None:
+    values = np.random.default_rng(3).standard_normal((8, 12, 8, 3)).astype(np.float32)
+    volumes.write(Path("a.vdb"), {"vel": Field(values, 0.25, (-3.0, -1.0, -2.0))})
+    text = tiny.changed(tiny.changed(tiny.SMOKE, TINY, 'kind = "file"\nfile = "a.vdb"'), "[16, 16]", "[16, 24, 16]")
+    found = motion(tiny.scene(Path(), tiny.changed(text, '"lit"', '"volume"')), [1, 2])
+    assert found[1] == found[2] == Field.centred(values, 3)
+    assert found[1].origin == pytest.approx((-1 / 3 + 1 / 24, 1 / 24, -1 / 3 + 1 / 24))
+
+
+def test_a_wind_from_a_file_keeps_its_speed_past_an_obstacle() -> None:
+    """Half a height a second on 8 × 8 cells, and far from the obstacle so on the 32 × 32 of H."""
+    images.write_field(Path("wind.exr"), Field.centred(np.full((8, 8, 2), (0.5, 0.0), np.float32), 2))
+    stone = '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.06\n[combine]'
+    text = tiny.changed(tiny.changed(tiny.SMOKE, TINY, 'kind = "file"\nfile = "wind.exr"'), "[16, 16]", "[32, 32]")
+    scene = tiny.scene(Path(), tiny.changed(text, "[combine]", stone))
+    (artifact,) = flow.solid_artifacts(scene)
+    ((_, solid),) = computed(artifact, scene, tiny.Memory(Path()), [0])
+    found = motion(scene, [1, 3], solid)
+    assert found[1] == found[3] and found[1].shape == (32, 32)
+    far = solid.values > 0.3
+    assert far.sum() > 100
+    speed = np.linalg.norm(found[1].values, axis=-1)
+    assert np.abs(speed[far] - 0.5).max() < 0.05
+    assert np.abs(speed - 0.5).max() > 0.1  # close to the stone it is another
+
+
+@pytest.mark.parametrize("coarse", [
+    'kind = "wake"\nsize = [16, 16]', 'kind = "analytic"\nsize = [16, 16]', 'kind = "smoke"\nsize = [16, 16]'])
+def test_what_goes_round_the_obstacles_by_itself_declares_no_border(coarse: str) -> None:
+    stone = '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.2\n[combine]'
+    scene = coarse_scene(coarse, "[combine]", stone)
+    artifact = flow.coarse_artifact(scene)
+    assert ("border" in artifact.reads) == ("wake" not in coarse)
+    assert dict(artifact.inputs) == {"solid": "once"}
+    assert scene.border == ("wall" if "smoke" in coarse else "open")
