@@ -7,37 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-
-from pipeline import stages
-from pipeline.progress import Progress
-from pipeline.scene import load
-
-SCENE = """\
-title = "A tiny circle"
-frames = 2
-[exemplar]
-kind = "circle"
-size = 8
-[coarse]
-kind = "analytic"
-flow = "rotation"
-size = [8, 8]
-[detail]
-size = [16, 16]
-iterations = 1
-neighborhoods = [5]
-[combine]
-omega = 1.5
-[density]
-m = 1
-scale = 1
-[render]
-kind = "lit"
-width = 32
-[figure]
-panels = ["coarse", "result"]
-panel = 32
-"""
+import tiny
 
 # runs the command line; the first time a file of this name is written and not yet renamed, it says so and waits
 HELD = """
@@ -60,16 +30,9 @@ cli.main(sys.argv[3:])
 """
 
 
-def contents(root: Path) -> dict[str, bytes]:
-    """Every file under `root`, by its path."""
-    return {file.relative_to(root).as_posix(): file.read_bytes() for file in sorted(root.rglob("*")) if file.is_file()}
-
-
-def run(folder: Path, scene: str = SCENE, verb: str = "figure") -> dict[str, bytes]:
+def run(folder: Path, scene: str = tiny.SMOKE, verb: str = "figure") -> dict[str, bytes]:
     """What an uninterrupted run leaves in folder/out/tiny."""
-    (folder / "tiny.toml").write_text(scene)
-    stages.run(verb, load(folder / "tiny.toml"), folder / "out", Progress(quiet=True))
-    return contents(folder / "out" / "tiny")
+    return tiny.contents(tiny.made(folder, scene, verb).root)
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +41,10 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return run(tmp_path_factory.mktemp("reference"))
 
 
-def stopped(folder: Path, name: str, by: signal.Signals, scene: str = SCENE,
+def stopped(folder: Path, name: str, by: signal.Signals, scene: str = tiny.SMOKE,
             verb: str = "figure") -> subprocess.CompletedProcess[str]:
     """`flowloom figure`, or another verb, stopped while the file `name` is written and not yet in its place."""
-    (folder / "tiny.toml").write_text(scene)
+    tiny.written(folder, scene)
     flag = folder / "flag"
     command = [sys.executable, "-P", "-c", HELD, name, str(flag), verb, "tiny.toml"]
     process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -118,19 +81,18 @@ def test_a_stopped_run_leaves_nothing_half_written_and_the_next_one_goes_on(
     if code > 0:
         assert ended.stderr.count("\n") == 1
         assert "run the same command again" in ended.stderr
-    left = contents(tmp_path / "out" / "tiny")
+    left = tiny.contents(tmp_path / "out" / "tiny")
     hidden = {path for path in left if any(part.startswith(".") for part in Path(path).parts)}
     for path in left.keys() - hidden:
-        assert left[path] == reference[path], f"{path} is not whole"
+        assert left[path] == reference[path], f"{path} is not complete"
     if code > 0:
         assert not [path for path in hidden if path.endswith(".partial")]
     assert run(tmp_path) == reference
 
 
-SOLID = SCENE.replace("[8, 8]", "[8, 8, 8]").replace(
-    "size = [16, 16]", 'size = [16, 16, 16]\nfacing = "density"\nlevels = 1').replace(
-    "m = 1\n", "m = 2\nsources = [{ centre = [0.0, 0.5], radius = 0.3 }]\n").replace(
-    "frames = 2", "frames = 3").replace('"lit"', '"volume"')
+SMOKY = tiny.changed(tiny.SMOKE, "m = 2\n", "m = 2\nsources = [{ centre = [0.0, 0.5], radius = 0.3 }]\n")
+SOLID = tiny.changed(tiny.changed(tiny.changed(SMOKY, "[8, 8]", "[8, 8, 8]"), "size = [16, 16]",
+                                  'size = [16, 16, 16]\nfacing = "density"\nlevels = 1'), '"lit"', '"volume"')
 
 
 @pytest.fixture(scope="module")
@@ -148,21 +110,21 @@ def solid_reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes
 def test_in_space_too_the_next_run_goes_on_with_the_same_bits(
         tmp_path: Path, solid_reference: dict[str, bytes], name: str, by: signal.Signals, code: int) -> None:
     assert stopped(tmp_path, name, by, SOLID, "bake").returncode == code
-    left = contents(tmp_path / "out" / "tiny")
+    left = tiny.contents(tmp_path / "out" / "tiny")
     for path in left:
         if not any(part.startswith(".") for part in Path(path).parts):
-            assert left[path] == solid_reference[path], f"{path} is not whole"
+            assert left[path] == solid_reference[path], f"{path} is not complete"
     if name == "H.0003.vdb":  # what the third frame goes on from
-        assert "fields/.whole/H.state.npz" in left
+        assert "fields/.journal/H.state.npz" in left
     assert run(tmp_path, SOLID, "bake") == solid_reference
 
 
 @pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_long_render_is_stopped_in_its_middle(tmp_path: Path, by: signal.Signals, code: int) -> None:
     render = 'kind = "volume"\nwidth = 400\nheight = 400\nspp = 4096'
-    volume = SCENE.replace('kind = "lit"\nwidth = 32', render).replace(
-        "m = 1\n", "m = 1\ndepth = { reach = 0.2 }\nsources = [{ centre = [0.0, 0.5], radius = 0.3 }]\n")
-    (tmp_path / "tiny.toml").write_text(volume)
+    volume = tiny.changed(SMOKY, 'kind = "lit"\nwidth = 32', render)
+    volume = tiny.changed(volume, "m = 2\n", "m = 2\ndepth = { reach = 0.2 }\n")
+    tiny.written(tmp_path, volume)
     # says so when Mitsuba is about to trace; that takes minutes
     code_ = ("import pathlib, signal, sys; from pipeline import cli; from render import smoke; "
              "traced = smoke.volume; "
@@ -185,18 +147,18 @@ def test_a_long_render_is_stopped_in_its_middle(tmp_path: Path, by: signal.Signa
 
 
 def test_two_runs_at_once_end_with_the_same_bits(tmp_path: Path, reference: dict[str, bytes]) -> None:
-    (tmp_path / "tiny.toml").write_text(SCENE)
+    tiny.written(tmp_path)
     command = [sys.executable, "-P", "-m", "pipeline.cli", "figure", "tiny.toml"]
     processes = [subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) for _ in range(2)]
     for process in processes:
         _, err = process.communicate(timeout=200)
         assert process.returncode == 0, err
-    assert contents(tmp_path / "out" / "tiny") == reference
+    assert tiny.contents(tmp_path / "out" / "tiny") == reference
 
 
 def test_the_farm_ends_with_the_same_bits_and_stops_its_processes(tmp_path: Path,
                                                                   reference: dict[str, bytes]) -> None:
-    (tmp_path / "tiny.toml").write_text(SCENE)
+    tiny.written(tmp_path)
     command = [sys.executable, "-P", "-m", "pipeline.cli", "farm", "tiny.toml", "--workers", "2", "--batch", "1"]
     subprocess.run(command, cwd=tmp_path, check=True, timeout=300)
-    assert contents(tmp_path / "out" / "tiny") == reference
+    assert tiny.contents(tmp_path / "out" / "tiny") == reference

@@ -37,7 +37,7 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
         except ValueError as error:
             raise BadInput(path, key, str(error)) from error
 
-    monkeypatch.setattr(tracks.shelter, "read", called)
+    monkeypatch.setattr(tracks.sandbox, "read", called)
 
 
 # --- our own ---
@@ -298,7 +298,7 @@ def test_points_by_a_pattern_and_threads_from_one_file(tmp_path: Path) -> None:
     for n in range(3):
         meshes.write_points(tmp_path / f"school.{n:04}.ply", np.full((5, 3), n, np.float32), {})
         meshes.write_points(tmp_path / f"other.{n:04}.ply", np.full((7, 3), n, np.float32), {})
-    for name in ("school.####.ply", "sh*.ply"):
+    for name in ("school.####.ply", "sc*.ply"):
         found = tracks.read_foreign(tmp_path / name, "key")
         assert found.positions.shape == (3, 5, 1, 3) and found.positions[2, 4, 0, 0] == 2 and found.grid == ()
     (tmp_path / "a.obj").write_text("".join(f"v {k} 0 {k * k}\n" for k in range(6)) + "l 1 2 3\nl 6 5 4\n")
