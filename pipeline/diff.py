@@ -81,7 +81,7 @@ def check(graph: BuildGraph, record: dict[str, Any]) -> list[str]:
 
 
 def _first_of_each(faults: list[Finding]) -> Iterator[str]:
-    """One line for each product: its first frame that differs, and how many more do."""
+    """One line for each artifact: its first frame that differs, and how many more do."""
     artifacts: dict[str, list[Finding]] = {}
     for fault in faults:
         artifacts.setdefault(re.sub(r"\.\d{4,}\.", ".", fault.name), []).append(fault)

@@ -90,7 +90,7 @@ def make_density(scene: MotionScene, inputs: Inputs, frames: list[int]) -> Itera
         return
     from synth.motion.density import naive, windowed
 
-    # both follow the same motions, the window a frame or so behind
+    # windowed takes L and F frame by frame: one frame of motion is held
     one, other = itertools.tee(motion(scene, inputs, frame) for frame in range(1, last + 1))
     F = map(_carried, one)
     if table.scheme == "naive":

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-
 class ExemplarTable(Table):
     """One exemplar."""
 

@@ -52,7 +52,6 @@ class View(Table):
         """Right and up, as they are written."""
         return PLANES[self.plane] if self.plane else (_triple(self.right), _triple(self.up))
 
-
     @property
     def volumetric(self) -> bool:
         """Whether its exemplar is a volume, which fixes all components."""

@@ -124,11 +124,6 @@ Panel = Literal["input", "exemplar", "exemplar-colour", "exemplar-arrows", "coar
                 "detail-colour", "detail-arrows", "detail-divergence", "combined", "combined-colour", "result"]
 
 
-def is_of_exemplar(panel: str) -> bool:
-    """Whether there are as many of a panel as there are exemplars."""
-    return panel.partition("-")[0] in ("input", "exemplar")
-
-
 class Figure(FigureTable):
     """The panels of X.png and X.mp4. With several variants and one panel, one panel for each of them; with
     several of both, one row for each variant. A panel of the exemplar stands once for each exemplar of the views."""
