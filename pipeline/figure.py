@@ -67,14 +67,14 @@ class Figure:
 
     def key(self, frames: Sequence[int], still: bool = False) -> str:
         """What a figure of these frames depends on."""
-        panels = {variant: [asdict(panel) for panel in panels] for variant, panels in self.panels.items()}
-        shown = [self.first.figure.columns, self.first.fps,
-                 {variant: scene.figure.labels for variant, scene in self.scenes.items()}]
+        panels = [[variant, self.scenes[variant].figure.labels, [asdict(panel) for panel in panels]]
+                  for variant, panels in self.panels.items()]
         hashes = [self.graph.require(variant, name, self.frame_of(variant, name, frame)).sha256
                   for variant, panel in self.places for frame in frames
                   for name in (self.artifact(panel, still), panel.inset) if name]
-        code = source_digest.digest([Figure.sheet, pictures.write, video.write])
-        return manifest.digest([panels, shown, hashes, code])
+        read = {self.graph.artifacts[variant][panel.artifact].format.read for variant, panel in self.places}
+        code = source_digest.digest([Figure.sheet, pictures.write, video.write, *read])
+        return manifest.digest([panels, self.first.figure.columns, self.first.fps, hashes, code])
 
     def artifact(self, panel: Panel, still: bool) -> str:
         """The artifact that a panel shows, in the animation or in the still."""

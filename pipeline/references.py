@@ -103,10 +103,10 @@ class _ProofInputs(DeclaredInputs):
         light: np.ndarray = next(computed(self._artifact, self._small, self, [frame]))[1]
         return light
 
-    def value(self, name: str, frame: int) -> Any:
+    def _value(self, name: str, frame: int) -> Any:
         if self._artifacts[name].stage == "render":
             return _ProofInputs(self._graph, self._variant, self._small, name).picture(frame)
-        return super().value(name, frame)
+        return super()._value(name, frame)
 
 
 def _numbers(value: Any) -> np.ndarray:

@@ -28,6 +28,7 @@ def run(stage: str, scenes: Scenes, out: Path, progress: Progress, frames: Seque
     stages = STAGES[: STAGES.index(stage) + 1] if frames is None else (stage,)
     for one in stages:
         graph.require_memory(one, frames)
+    for one in stages:
         graph.check(one)
     for one in stages:
         if one == "figure":

@@ -121,6 +121,24 @@ TRACKS = changed(BEADS, 'kind = "hexagonal-grid"\nacross = 6', 'kind = "tracks"\
 """Elements of the file that replaces FILE."""
 
 
+RIVER = changed(changed(SMOKE, 'kind = "lit"\nwidth = 32', 'kind = "particles"\nwidth = 32\nspp = 1'), '"input", ', "")
+RIVER += '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.2\n[particles]\ncount = 20\n'
+VOLUME = changed(changed(SMOKE, 'kind = "lit"\nwidth = 32', 'kind = "volume"\nwidth = 16\nheight = 16\nspp = 1'),
+                 "m = 2\n", "m = 2\ndepth = { reach = 0.2 }\nsources = [{ centre = [0.0, 0.5], radius = 0.3 }]\n")
+SPACE = SMOKE.replace("frames = 3", "frames = 2").replace("size = [8, 8]", "size = [8, 4, 8]").replace(
+    "size = [16, 16]", 'size = [16, 8, 16]\nfacing = "density"').replace('"rotation"', '"constant"').replace(
+    '["input", "coarse", "result"]', '["detail-arrows", "result"]').replace(
+    'kind = "lit"\nwidth = 32',
+    'kind = "seaweed"\nwidth = 32\nheight = 18\nspp = 1\n[blades]\nspacing = 0.4\nwindow = 2')
+SPACE = SPACE.replace("m = 2\n", "m = 2\nsources = [{ centre = [0.0, 0.5, 0.0], radius = 0.3 }]\n")
+POTENTIAL = changed(changed(SMOKE, "iterations = 1", 'iterations = 1\nsynthesize = "potential"'),
+                    '"coarse", "result"', '"detail-divergence", "combined-colour"')
+LAGRANGIAN = changed(SMOKE, "iterations = 1", 'iterations = 1\nsamples = "lagrangian"')
+SCENES = {"smoke": SMOKE, "river": RIVER, "volume": VOLUME, "space": SPACE, "potential": POTENTIAL,
+          "lagrangian": LAGRANGIAN, "beads": BEADS, "fish": FISH, "noodles": NOODLES, "paper": PAPER}
+"""Scenes that together have every stage, every look and every way to synthesize."""
+
+
 def written(folder: Path, text: str = SMOKE, name: str = "tiny.toml") -> Path:
     """A scene file with `text`."""
     (folder / name).write_text(text)

@@ -36,15 +36,16 @@ class Artifact:
     """One series of files, `name.0001.suffix` …, or the one file `name.suffix`.
 
     stage        a key of FOLDERS
-    reads        dotted keys of the scene that its content depends on; the first is named for values that the methods
-                 refuse. `make` can read no other: they raise Undeclared
+    reads        dotted keys of the scene that its content depends on; `make` can read no other: they raise Undeclared.
+                 Where a method refuses a value, the error names the first
     inputs       artifacts it is made from, and which of their frames frame i needs: the "same", all "until" and with
                  i, "every" one, or the one file there is ("once")
     make         make(scene, inputs, frames, **arguments): yields (frame, value) for each of `frames` (ascending), in
-                 that order. A function of a module or a method of a table, no closure: what it does is told by its
-                 sources and by `arguments`
+                 that order; a frame has the same bits whichever others are made with it. A function of a module or a
+                 method of a table, no closure: what it does is told by its sources and by `arguments`
     arguments    JSON values; they count for the key
     animated     one file per frame
+    state_is_frame  a frame holds all that the next is made from: its checkpoint is the frame before
     still        of an animated artifact: there is only the frame that the still shows
     export       made for other programs: nothing of ours reads it
     shared       belongs to no scene: kept once for all of them, in a folder named after its content
@@ -62,6 +63,7 @@ class Artifact:
     make: Callable[..., Iterator[tuple[int, Any]]]
     arguments: Mapping[str, Any] = field(default_factory=dict)
     animated: bool = True
+    state_is_frame: bool = False
     still: bool = False
     export: bool = False
     shared: bool = False

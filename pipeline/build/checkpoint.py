@@ -44,3 +44,21 @@ class Checkpoint:
                 return frame, {name: kept[name] for name in kept.files if name not in ("frame", "key")}
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
             return None
+
+
+class OwnFrames(Checkpoint):
+    """The checkpoint of an artifact whose frames are its states: it goes on from the frame before.
+
+    read  the value of one of its own frames, None if that is not up to date
+    """
+
+    def __init__(self, read: Callable[[int], State | None]):
+        self._read = read
+
+    def save(self, frame: int, state: Mapping[str, np.ndarray]) -> None:
+        """The frame is the state: nothing more is kept."""
+
+    def load(self, before: int | None = None) -> tuple[int, State] | None:
+        """The frame before `before`, if there is one."""
+        state = self._read(before - 1) if before and before > 1 else None
+        return None if before is None or state is None else (before - 1, state)

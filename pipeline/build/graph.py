@@ -7,6 +7,7 @@ re-synthesize, and variants share all that they do not change.
 
 from __future__ import annotations
 
+import graphlib
 import os
 import re
 import unicodedata
@@ -17,7 +18,7 @@ from typing import Any
 
 from pipeline.build import keys, manifest
 from pipeline.build.artifact import FOLDERS, Artifact
-from pipeline.build.checkpoint import Checkpoint
+from pipeline.build.checkpoint import Checkpoint, OwnFrames
 from pipeline.build.manifest import Entry, Folder
 from pipeline.build.method import Method
 from pipeline.build.view import SceneView, Undeclared, value_at
@@ -49,6 +50,7 @@ class BuildGraph:
         self._keys: dict[tuple[Path, str], str] = {}
         self._chains: dict[tuple[Path, str], list[str]] = {}
         self._content: dict[tuple[str, str], str] = {}
+        self._constant: dict[tuple[str, str], str] = {}
 
     @property
     def name(self) -> str:
@@ -107,7 +109,9 @@ class BuildGraph:
             known = [sha256 for sha256 in hashes if sha256]
             if len(known) < len(hashes):
                 return None
-            self._keys[file.parent, file.name] = keys.key(artifact, scene, self.artifacts[variant], frame, known)
+            if (variant, name) not in self._constant:
+                self._constant[variant, name] = keys.constant(artifact, scene, self.artifacts[variant])
+            self._keys[file.parent, file.name] = keys.key(self._constant[variant, name], frame, known)
         return self._keys[file.parent, file.name]
 
     def _input_hash(self, variant: str, name: str, which: str, frame: int) -> str | None:
@@ -174,23 +178,11 @@ class BuildGraph:
 
     def _in_order(self, stage: str) -> list[str]:
         """The names of a stage's artifacts, each after those that any variant makes it from."""
-        inputs: dict[str, list[str]] = {}
-        for artifacts in self.artifacts.values():
-            for artifact in artifacts.values():
-                if artifact.stage == stage:
-                    inputs.setdefault(artifact.name, []).extend(name for name, _ in artifact.inputs)
-        order: list[str] = []
-
-        def place(name: str) -> None:
-            for other in inputs[name]:
-                if other in inputs and other not in order:
-                    place(other)
-            if name not in order:
-                order.append(name)
-
-        for name in inputs:
-            place(name)
-        return order
+        before: dict[str, list[str]] = {}
+        for artifact in (one for artifacts in self.artifacts.values() for one in artifacts.values()):
+            if artifact.stage == stage:
+                before.setdefault(artifact.name, []).extend(name for name, _ in artifact.inputs)
+        return [name for name in graphlib.TopologicalSorter(before).static_order() if name in before]
 
     def check(self, stage: str) -> None:
         """Read every file of the user's that a stage still needs, and check what else can be, before any work."""
@@ -277,7 +269,10 @@ def computed(artifact: Artifact, scene: Any, inputs: DeclaredInputs, frames: Seq
         inputs.current = frame
         if artifact.check_frame:
             artifact.check_frame(scene, inputs, frame)
-        yield next(made)
+        found, value = next(made, (None, None))
+        if found != frame:
+            raise RuntimeError(f"{artifact.name} yields frame {found} instead of {frame}")
+        yield frame, value
 
 
 class DeclaredInputs:
@@ -293,18 +288,21 @@ class DeclaredInputs:
     def read(self, name: str, frame: int = 0) -> Any:
         which = dict(self._artifact.inputs).get(name)
         allowed = {"same": frame == self.current, "until": 0 < frame <= self.current, "once": frame == 0,
-                   "every": frame > 0}
+                   "every": 0 < frame <= self._graph.variants[self._variant].frames}
         if which is None or not allowed[which]:
             raise Undeclared(f"{self._artifact.name} reads {name} of frame {frame} for frame {self.current}, "
                              f"which it does not declare ({which or 'not an input'})")
-        return self.value(name, frame)
+        return self._value(name, frame)
 
-    def value(self, name: str, frame: int) -> Any:
+    def _value(self, name: str, frame: int) -> Any:
         """The value of a frame of an input, from its file."""
         return self._graph.read(self._variant, name, frame)
 
     @property
     def checkpoint(self) -> Checkpoint:
         graph, variant, name = self._graph, self._variant, self._artifact.name
+        if self._artifact.state_is_frame:
+            return OwnFrames(lambda frame: graph.read(variant, name, frame)
+                             if graph.entry(variant, name, frame) else None)
         file = graph.folder(variant, name).path / manifest.JOURNAL / f"{name}.state.npz"
         return Checkpoint(file, lambda frame: graph.key(variant, name, frame) or "")

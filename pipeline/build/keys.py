@@ -2,7 +2,7 @@
 
     name, arguments     of the artifact, and the frame
     values              the scene's values that it declares, files of the user's by their content
-    code                what computes it, found by following its imports (`source_digest`)
+    code                what computes it, found by following the names it uses (`source_digest`)
     format              suffix and options
     inputs              the hash of each file it is made from
 
@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,53 +21,62 @@ from pipeline.build.manifest import digest, file_sha256
 from pipeline.build.view import value_at
 
 
-def key(artifact: Artifact, scene: Any, made_from: Mapping[str, Artifact], frame: int, hashes: Sequence[str]) -> str:
-    """The key of a frame. `made_from`: the artifacts of its inputs; `hashes`: of the files themselves."""
-    names = [f"{name} {which}" for name, which in artifact.inputs]
-    return digest([artifact.name, frame, declared(artifact, scene), names, hashes, code(artifact, scene, made_from)])
+def key(constant: str, frame: int, hashes: Sequence[str]) -> str:
+    """The key of a frame; `hashes`: of the files that it is made from, in the order of the artifact's inputs."""
+    return digest([constant, frame, hashes])
+
+
+def constant(artifact: Artifact, scene: Any, made_from: Mapping[str, Artifact]) -> str:
+    """What is the same in the keys of all frames. `made_from`: the artifacts of its inputs."""
+    return digest([declared(artifact, scene), code(artifact, scene, made_from)])
 
 
 def content_id(artifact: Artifact, scene: Any, inputs: Sequence[str]) -> str:
     """Equal for two scenes exactly if this artifact of theirs has the same content; `inputs`: the ids of its inputs.
 
-    It does not know the code, so that an edit does not move files.
+    It knows which function makes the artifact but not the code, so that an edit does not move files.
     """
-    return digest([artifact.name, declared(artifact, scene), inputs])
+    table = getattr(artifact.make, "__self__", None)
+    owner = "" if table is None else (table if isinstance(table, type) else type(table)).__qualname__
+    return digest([declared(artifact, scene), artifact.make.__module__, artifact.make.__qualname__, owner, inputs])
 
 
 def declared(artifact: Artifact, scene: Any) -> list[Any]:
-    """The values of the scene that an artifact declares, its arguments and its format, as JSON."""
+    """Name, inputs, the values of the scene that an artifact declares, arguments and format, as JSON."""
     values = {read: plain(value_at(scene, read)) for read in artifact.reads}
-    return [values, plain(artifact.arguments), artifact.format.suffix, plain(artifact.format.options)]
+    needs = [[name, which, scene.frames if which == "every" else 0] for name, which in artifact.inputs]
+    return [artifact.name, values, needs, plain(artifact.arguments), artifact.format.suffix,
+            plain(artifact.format.options)]
 
 
 def code(artifact: Artifact, scene: Any, made_from: Mapping[str, Artifact]) -> str:
     """SHA-256 of the code that computes an artifact, writes it and reads its inputs."""
     functions = [artifact.make, artifact.format.write, *(made_from[name].format.read for name, _ in artifact.inputs)]
-    return source_digest.digest(functions, _tables([value_at(scene, read) for read in artifact.reads]))
+    return source_digest.digest(functions, tables(artifact, scene))
 
 
-def _tables(values: Sequence[Any]) -> set[type]:
-    """The classes of the tables among values, and in them: their methods are code that `make` can call."""
-    found: set[type] = set()
-    for value in values:
-        if hasattr(value, "model_dump"):
-            inner = [getattr(value, name) for name in type(value).model_fields]
-            found |= {type(value), *_tables(inner)}
-        elif isinstance(value, tuple):
-            found |= _tables(value)
-    return found
+def tables(artifact: Artifact, scene: Any) -> set[type]:
+    """The classes of the tables that an artifact declares: their methods are code that `make` can call."""
+    return {type(value) for value in _declared_values(artifact, scene) if hasattr(value, "model_fields")}
 
 
 def reads_files(artifact: Artifact, scene: Any) -> bool:
     """Whether its content depends on files that the scene names."""
-    return _has_path([value_at(scene, read) for read in artifact.reads])
+    return any(isinstance(value, Path) for value in _declared_values(artifact, scene))
 
 
-def _has_path(values: Sequence[Any]) -> bool:
-    return any(isinstance(value, Path) or (isinstance(value, tuple) and _has_path(value))
-               or (hasattr(value, "model_dump") and _has_path([getattr(value, n) for n in type(value).model_fields]))
-               for value in values)
+def _declared_values(artifact: Artifact, scene: Any) -> Iterator[Any]:
+    """The values that an artifact declares, and all that is in them."""
+    waiting = [value_at(scene, read) for read in artifact.reads]
+    while waiting:
+        value = waiting.pop()
+        yield value
+        if hasattr(type(value), "model_fields"):
+            waiting += [getattr(value, name) for name in type(value).model_fields]
+        elif isinstance(value, Mapping):
+            waiting += value.values()
+        elif isinstance(value, tuple | list):
+            waiting += value
 
 
 def plain(value: Any) -> Any:

@@ -5,9 +5,10 @@ each function, class and constant counts by itself, with those that it names: on
 looks, and an edit to one must not render the others again. `pipeline.build` and the errors compute nothing. The methods
 of the tables that an artifact reads count too: `make` can call them.
 
-Only what computes counts: formatting, comments, docstrings and annotations do not.
+Only what computes counts: formatting, comments and docstrings do not.
 
-Not followed: names that are made up at run time. tests/pipeline/build/test_source_digest.py traces what runs.
+Not followed: names that are made up at run time, and partial functions. tests/pipeline/build/test_source_digest.py
+traces what runs.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from __future__ import annotations
 import ast
 import functools
 import hashlib
+import importlib
 import inspect
 import re
 import sys
@@ -27,8 +29,8 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 WHOLE = ("synth", "render")
-COMPUTES_NOTHING = ("pipeline.build", "pipeline.errors", "pipeline.tables", "pipeline.files.atomic",
-                    "pipeline.files.format")
+COMPUTES_NOTHING = ("pipeline.build.", "pipeline.errors.", "pipeline.tables.", "pipeline.files.atomic.",
+                    "pipeline.files.format.")
 Owned = tuple[Any, type | None]
 """A function or a constant, and the class that `self` and `cls` stand for in it."""
 
@@ -39,28 +41,27 @@ def digest(functions: Iterable[Callable[..., Any]], tables: Iterable[type] = ())
 
 
 def sources(functions: Iterable[Callable[..., Any]], tables: Iterable[type] = ()) -> dict[str, str]:
-    """What counts, by its place, `synth/advect.py` or `pipeline.flow.walls`, and the SHA-256 of each in it."""
+    """The place of each thing that counts, `synth/advect.py` or `pipeline.flow.walls`, by place and SHA-256."""
     waiting: list[Owned] = [(_plain(function), _owner(function)) for function in functions]
     waiting += [method for table in tables for method in _methods(table)]
     seen, found = set[tuple[int, type | None]](), dict[str, str]()
     while waiting:
         item, owner = waiting.pop()
         place = f"{item.__module__}.{item.__qualname__}"
-        if (id(item), owner) in seen or not _counts(item.__module__) or "Artifact" in _returned(item):
-            continue  # a function that declares artifacts makes none
+        if (id(item), owner) in seen or not _counts(item.__module__) or _declares_artifacts(item):
+            continue
         seen.add((id(item), owner))
         found[f"{place} {_code_digest(item)}"] = place
         for name, value in _named(item, owner):
             if isinstance(value, Path):
                 found |= _files(value)
             elif isinstance(value, types.FunctionType):
-                waiting.append((_plain(value), owner if owner and getattr(owner, name, None) is not None else None))
-            elif isinstance(value, types.MethodType):
-                waiting.append((_plain(value), owner))
-            elif isinstance(value, property):
-                waiting.append((value.fget, owner))
+                waiting.append((value, owner if owner and getattr(owner, name, None) is not None else None))
             elif isinstance(value, type):
                 waiting += _methods(value)
+                found |= {f"{place} {value.__qualname__}.{inner} {_sha256(_spelled(data))}": place
+                          for inner, data in vars(value).items()
+                          if not inner.startswith(("__", "_abc_")) and _is_constant(data)}
             else:
                 found[f"{place} {name} {_sha256(_spelled(value))}"] = place
                 waiting += [(inner, None) for inner in _functions_in(value)]
@@ -68,7 +69,9 @@ def sources(functions: Iterable[Callable[..., Any]], tables: Iterable[type] = ()
 
 
 def _plain(value: Any) -> Any:
-    """A function without what decorators put round it; anything else as it is."""
+    """A function without what decorators put round it, of a property its getter; anything else as it is."""
+    if isinstance(value, property):
+        value = value.fget
     return inspect.unwrap(getattr(value, "__func__", value)) if callable(value) or hasattr(value, "__func__") else value
 
 
@@ -83,40 +86,59 @@ def _owner(function: Any) -> type | None:
 
 
 def _methods(table: type) -> list[Owned]:
-    """The methods that a class of pipeline defines or inherits."""
-    return [(_plain(value.fget if isinstance(value, property) else value), table)
-            for one in table.__mro__ if _counts(one.__module__) for name, value in vars(one).items()
-            if isinstance(value, types.FunctionType | classmethod | staticmethod | property) and name[:2] != "__"]
+    """The methods that a class of pipeline defines or inherits; not those that a library wrote."""
+    methods = [_plain(value) for one in table.__mro__ if _counts(one.__module__) for value in vars(one).values()
+               if isinstance(value, types.FunctionType | classmethod | staticmethod | property)]
+    return [(one, table) for one in methods if _counts(one.__module__) and one.__code__.co_filename[0] != "<"]
 
 
 def _counts(module: str) -> bool:
-    return module.startswith("pipeline.") and not module.startswith(COMPUTES_NOTHING)
+    return f"{module}.".startswith("pipeline.") and not f"{module}.".startswith(COMPUTES_NOTHING)
 
 
-def _returned(function: Any) -> str:
-    return str(getattr(function, "__annotations__", {}).get("return", ""))
+def _declares_artifacts(function: Any) -> bool:
+    """Such a function makes none: what it decides is in the artifact, which its key knows."""
+    return str(getattr(function, "__annotations__", {}).get("return", "")) in ("Artifact", "tuple[Artifact, ...]")
 
 
 def _named(function: types.FunctionType, owner: type | None) -> Iterator[tuple[str, Any]]:
     """What of ours a function names: functions, classes and constants of pipeline, files of synth and render."""
-    names = list(_names(function.__code__))
-    for name in names:
-        value = _plain(function.__globals__.get(name))
-        if isinstance(value, types.ModuleType) and _counts(f"{value.__name__}."):
-            yield from ((inner, vars(value)[inner]) for inner in names if _is_ours(vars(value).get(inner)))
-        elif isinstance(value, types.ModuleType) and value.__name__.split(".")[0] in WHOLE:
-            yield name, _file(value.__name__)
+    names = [*_names(function.__code__)]
+    known = [(name, _plain(function.__globals__[name])) for name in names if name in function.__globals__]
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    known += [(name, _plain(cell.cell_contents)) for name, cell in cells]
+    known += [(name, value) for name in names for value in _imported_inside(name, names)]
+    for module in [value for _, value in known if isinstance(value, types.ModuleType) and _counts(value.__name__)]:
+        known += [(name, _plain(vars(module)[name])) for name in names if name in vars(module)]
+    for name, value in known:
+        home = value.__name__ if isinstance(value, types.ModuleType) else getattr(value, "__module__", None) or ""
+        if home.split(".")[0] in WHOLE:
+            yield name, _file(home)
         elif _is_ours(value):
             yield name, value
-        elif (getattr(value, "__module__", "") or "").split(".")[0] in WHOLE:
-            yield name, _file(value.__module__)
-        if owner is not None and _counts(owner.__module__) and name in dir(owner) and name[:2] != "__":
-            inherited = inspect.getattr_static(owner, name)
-            if name not in getattr(owner, "model_fields", {}) and _is_ours(_plain(inherited)):
-                yield name, _plain(inherited)
-        if name.split(".")[0] in WHOLE:  # an import inside the function
-            files = (_file(f"{name}.{inner}".rstrip(".")) for inner in ("", *names))
-            yield from ((name, file) for file in files if file.is_file())
+    if owner is not None:
+        yield from _inherited(owner, names)
+
+
+def _inherited(owner: type, names: list[str]) -> Iterator[tuple[str, Any]]:
+    """What a method of `owner` can mean by `self.x` and `cls.x`, and by `super().x`."""
+    for one in owner.__mro__ if _counts(owner.__module__) else ():
+        for name in names:
+            value = _plain(vars(one).get(name))
+            if value is None or not _is_ours(value) or name in getattr(owner, "model_fields", {}):
+                continue
+            if "super" in names or inspect.getattr_static(owner, name) is vars(one)[name]:
+                yield name, value
+
+
+def _imported_inside(name: str, names: list[str]) -> Iterator[Any]:
+    """The modules that an import inside a function binds: files of synth and render, modules of pipeline."""
+    if name.split(".")[0] in WHOLE or _counts(name):
+        for dotted in (name, *(f"{name}.{inner}" for inner in names)):
+            if _file(dotted).is_file():
+                yield _file(dotted) if name.split(".")[0] in WHOLE else importlib.import_module(dotted)
+            elif (compiled := _file(dotted.replace("._", ".")).with_suffix(".cpp")).is_file():
+                yield compiled
 
 
 def _names(code: types.CodeType) -> Iterator[str]:
@@ -128,23 +150,34 @@ def _names(code: types.CodeType) -> Iterator[str]:
 
 
 def _is_ours(value: Any) -> bool:
-    """Whether it is a function, a class or a property of pipeline that counts, or a constant."""
-    if isinstance(value, property):
-        value = value.fget
-    if isinstance(value, types.FunctionType | types.MethodType | type):
-        return _counts(getattr(value, "__module__", "") or "")
-    return isinstance(value, int | float | str | tuple | dict | list | np.ndarray | re.Pattern)
+    """Whether it is a function or a class of pipeline that counts, a constant, or the source of a compiled module."""
+    if isinstance(value, types.FunctionType | type):
+        return _counts(value.__module__)
+    return isinstance(value, Path) or _is_constant(value)
+
+
+def _is_constant(value: Any) -> bool:
+    """Whether it is data: not a module, and nothing that is called."""
+    return not (callable(value) or isinstance(value, types.ModuleType | classmethod | staticmethod | property)
+                or value is None or type(value).__module__ in ("typing", "types", "__future__"))
 
 
 def _spelled(value: Any) -> str:
-    """A constant as text: the same in every process."""
-    if isinstance(value, np.ndarray):
+    """Data as text, the same in every process. Raises TypeError for what has no such text."""
+    if isinstance(value, np.ndarray | np.generic):
         return f"{value.dtype} {value.shape} {value.tobytes()!r}"
     if isinstance(value, dict):
         return f"{{{', '.join(f'{name!r}: {_spelled(inner)}' for name, inner in value.items())}}}"
+    if isinstance(value, set | frozenset):
+        return f"{{{', '.join(sorted(map(_spelled, value)))}}}"
     if isinstance(value, tuple | list):
         return f"[{', '.join(map(_spelled, value))}]"
-    return getattr(value, "__qualname__", None) or repr(value)
+    if isinstance(value, types.CodeType):
+        return _spelled(_instructions(value))
+    text = getattr(value, "__qualname__", None) or repr(value)
+    if " at 0x" in text:
+        raise TypeError(f"a constant that keys cannot know: {text}")
+    return text
 
 
 def _functions_in(value: Any) -> Iterator[types.FunctionType]:
@@ -156,14 +189,14 @@ def _functions_in(value: Any) -> Iterator[types.FunctionType]:
 
 
 def _code_digest(function: types.FunctionType) -> str:
-    return _sha256(repr([_instructions(function.__code__), function.__defaults__, function.__kwdefaults__]))
+    docstring = function.__code__.co_consts[:1] == (function.__doc__,)
+    code = _instructions(function.__code__, docstring)
+    return _sha256(_spelled([code, function.__defaults__, function.__kwdefaults__]))
 
 
-def _instructions(code: types.CodeType) -> list[Any]:
+def _instructions(code: types.CodeType, docstring: bool = False) -> list[Any]:
     """What a function does, without its docstring and its place in the file."""
-    docstring = code.co_consts[:1] if code.co_consts and isinstance(code.co_consts[0], str) else ()
-    constants = [_instructions(c) if isinstance(c, types.CodeType) else c for c in code.co_consts[len(docstring):]]
-    return [code.co_code, code.co_names, code.co_varnames, code.co_freevars, constants]
+    return [code.co_code, code.co_names, code.co_varnames, code.co_freevars, code.co_consts[docstring:]]
 
 
 def _sha256(text: str) -> str:

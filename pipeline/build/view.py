@@ -6,7 +6,6 @@ in silence. So `make` is given a view of the scene, in the product as in every t
 
 from __future__ import annotations
 
-import types
 from collections.abc import Sequence
 from typing import Any
 
@@ -31,8 +30,8 @@ class SceneView:
     """A scene, or a table of it, of which only the keys in `reads` can be read.
 
     A declared key gives the value itself, with all that it holds; a table above a declared key gives a view of that
-    table. A property of the scene is a key like any other: its value counts. The methods of a table can be called;
-    of a table that is not declared as a whole they see the view.
+    table. A property or a constant of a table is a key like any other: its value counts. Methods can be called only of
+    a table that is declared as a whole, whose code then counts.
     """
 
     __slots__ = ("_by", "_path", "_reads", "_value")
@@ -44,11 +43,6 @@ class SceneView:
         key = f"{self._path}.{name}" if self._path else name
         if _covered(key, self._reads):
             return getattr(self._value, name)
-        defined = getattr(type(self._value), name, None)
-        if isinstance(defined, types.FunctionType):
-            return types.MethodType(defined, self)
-        if isinstance(defined, types.MethodType):  # of the class: it sees no value
-            return defined
         if not any(read.startswith((f"{key}.", f"{key}[")) for read in self._reads):
             raise Undeclared(f"{self._by} reads {key}, which it does not declare")
         value = getattr(self._value, name, None)

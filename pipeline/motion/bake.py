@@ -90,13 +90,12 @@ def make_density(scene: MotionScene, inputs: Inputs, frames: list[int]) -> Itera
         return
     from synth.motion.density import naive, windowed
 
-    # windowed takes L and F frame by frame: one frame of motion is held
-    one, other = itertools.tee(motion(scene, inputs, frame) for frame in range(1, last + 1))
-    F = map(_carried, one)
+    motions = (motion(scene, inputs, frame) for frame in range(1, last + 1))
     if table.scheme == "naive":
-        every = naive(F, sources(scene), **settings)
-    else:
-        every = windowed((m.L for m in other), F, sources(scene), table.m, **settings)
+        every = naive(map(_carried, motions), sources(scene), **settings)
+    else:  # it takes L and F frame by frame: one frame of motion is held
+        one, other = itertools.tee(motions)
+        every = windowed((m.L for m in other), map(_carried, one), sources(scene), table.m, **settings)
     for frame, values in enumerate(every, start=1):
         if frame in frames:
             yield frame, _placed(scene, inputs, values)
@@ -184,7 +183,7 @@ def _in_world(scene: MotionScene, inputs: Inputs, frame: int) -> Field:
 
 
 def make_particles(scene: MotionScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, Mesh]]:
-    """The particles. An interrupted run goes on from the last state that was kept: same bits."""
+    """The particles. A run goes on from the frame before: same bits."""
     from synth import particles
 
     table, distance = scene.particles, walls(scene, inputs)
@@ -253,7 +252,8 @@ def density_artifact(scene: MotionScene) -> Artifact:
 
 def particles_artifact(scene: MotionScene) -> Artifact:
     """The particles."""
-    return Artifact("particles", "bake", meshes.POINTS, ("particles", "seed", *F_READS), _until(scene), make_particles)
+    return Artifact("particles", "bake", meshes.POINTS, ("particles", "seed", *F_READS), _until(scene), make_particles,
+                    state_is_frame=True)
 
 
 def blades_artifact(scene: MotionScene) -> Artifact:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tiny
-from tiny import SMOKE
+from tiny import SCENES, SMOKE
 
 from pipeline import stages
 from pipeline.build import manifest
@@ -446,3 +446,17 @@ def test_a_check_of_a_frame_refuses_before_it_is_made(tmp_path: Path) -> None:
 def refuse_above_25(scene: Any, inputs: Any, frame: int) -> None:
     if 10 * inputs.read("sum", frame) > 25:
         raise ValueError(f"{10 * inputs.read('sum', frame)} is too much")
+
+
+@pytest.mark.parametrize("text", SCENES.values(), ids=SCENES)
+def test_a_frame_has_the_same_bits_whichever_others_are_made_with_it(tmp_path: Path, text: str) -> None:
+    """What is carried from one frame to the next, or decided by the frames asked for, is in no key."""
+    together = tiny.made(tmp_path, text, "render")
+    expected = bits(together.root)
+    frames = [artifact.frames(together.variants[""]) for artifact in together.artifacts[""].values()]
+    for folder in ("geometry", "images"):
+        shutil.rmtree(together.root / folder, ignore_errors=True)
+    for stage in ("bake", "render"):
+        for frame in reversed(range(1, max(map(len, frames)) + 1)):
+            tiny.made(tmp_path, text, stage, [frame])
+    assert bits(tiny.made(tmp_path, text, "render").root) == expected

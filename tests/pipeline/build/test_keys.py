@@ -27,7 +27,7 @@ def artifact(*reads: str) -> Artifact:
 
 
 def values(one: Any, *reads: str) -> Any:
-    return keys.declared(artifact(*reads), one)[0]
+    return keys.declared(artifact(*reads), one)[1]
 
 
 @pytest.mark.parametrize(("old", "new", "expected"), [
@@ -90,20 +90,20 @@ def test_every_ingredient_changes_the_key(tmp_path: Path) -> None:
     one, plain = scene(tmp_path), artifact("seed")
     of_input = {"Q": replace(plain, name="Q")}
     found = [
-        keys.key(plain, one, {}, 1, []),
-        keys.key(plain, one, {}, 2, []),
-        keys.key(replace(plain, name="R"), one, {}, 1, []),
-        keys.key(replace(plain, arguments={"style": "lines"}), one, {}, 1, []),
-        keys.key(replace(plain, reads=("seed", "fps")), one, {}, 1, []),
-        keys.key(plain, scene(tmp_path, "seed = 2\n" + SMOKE), {}, 1, []),
-        keys.key(replace(plain, make=flow.make_solid), one, {}, 1, []),
-        keys.key(replace(plain, format=fields.velocity(3, 24)), one, {}, 1, []),
-        keys.key(replace(plain, format=fields.velocity(3, 25)), one, {}, 1, []),
-        keys.key(replace(plain, inputs=(("Q", "same"),)), one, of_input, 1, ["a"]),
-        keys.key(replace(plain, inputs=(("Q", "same"),)), one, of_input, 1, ["b"]),
-        keys.key(replace(plain, inputs=(("Q", "until"),)), one, of_input, 1, ["b"])]
+        keys.key(keys.constant(plain, one, {}), 1, []),
+        keys.key(keys.constant(plain, one, {}), 2, []),
+        keys.key(keys.constant(replace(plain, name="R"), one, {}), 1, []),
+        keys.key(keys.constant(replace(plain, arguments={"style": "lines"}), one, {}), 1, []),
+        keys.key(keys.constant(replace(plain, reads=("seed", "fps")), one, {}), 1, []),
+        keys.key(keys.constant(plain, scene(tmp_path, "seed = 2\n" + SMOKE), {}), 1, []),
+        keys.key(keys.constant(replace(plain, make=flow.make_solid), one, {}), 1, []),
+        keys.key(keys.constant(replace(plain, format=fields.velocity(3, 24)), one, {}), 1, []),
+        keys.key(keys.constant(replace(plain, format=fields.velocity(3, 25)), one, {}), 1, []),
+        keys.key(keys.constant(replace(plain, inputs=(("Q", "same"),)), one, of_input), 1, ["a"]),
+        keys.key(keys.constant(replace(plain, inputs=(("Q", "same"),)), one, of_input), 1, ["b"]),
+        keys.key(keys.constant(replace(plain, inputs=(("Q", "until"),)), one, of_input), 1, ["b"])]
     assert len(set(found)) == len(found)
-    assert keys.key(plain, one, {}, 1, []) == found[0]
+    assert keys.key(keys.constant(plain, one, {}), 1, []) == found[0]
 
 
 MARCHED = changed(SMOKE, 'kind = "lit"\nwidth = 32', 'kind = "volume"\nmethod = "both"\nwidth = 16\nheight = 16')
@@ -121,9 +121,8 @@ def test_the_picture_of_both_methods_depends_on_whether_there_is_an_animation(tm
 def places(folder: Path, text: str, name: str) -> set[str]:
     """Where the code is that an artifact depends on."""
     made = graph(folder, text)
-    one, tables = made.artifacts[""][name], keys._tables([
-        keys.value_at(made.variants[""], read) for read in made.artifacts[""][name].reads])
-    return set(keys.source_digest.sources([one.make, one.format.write], tables).values())
+    one = made.artifacts[""][name]
+    return set(keys.source_digest.sources([one.make, one.format.write], keys.tables(one, made.variants[""])).values())
 
 
 @pytest.mark.parametrize(("text", "name", "expected"), [

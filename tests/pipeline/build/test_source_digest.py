@@ -2,6 +2,8 @@
 
 import importlib.util
 import inspect
+import os
+import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -11,11 +13,11 @@ from typing import Any
 
 import pytest
 import tiny
-from tiny import BEADS, FISH, NOODLES, PAPER, SMOKE, changed
+from tiny import SCENES, changed
 
 from pipeline.build import graph, keys, source_digest
 from pipeline.build.artifact import Artifact
-from pipeline.build.view import value_at
+from pipeline.files.format import Format
 
 SOURCE = '''
 """A module of pipeline."""
@@ -78,6 +80,11 @@ class Look(Base):
     def unused(self):
         return 3
 
+    def lifted(self):
+        return super().colour() + self.UNIT
+
+    UNIT = 7
+
 
 class Other(Base):
     """Another."""
@@ -126,6 +133,7 @@ def test_only_what_computes_counts(tmp_path: Path, old: str, new: str, counts: b
     ("return 4", "return 5", False),
     ("return 3", "return 5", False),
     ("return 1", "return 5", False),  # Look has a colour of its own
+    ("UNIT = 7", "UNIT = 8", False),
 ])
 def test_a_method_counts_with_the_methods_that_it_calls_on_its_own_class(tmp_path: Path, old: str, new: str,
                                                                          counts: bool) -> None:
@@ -140,6 +148,54 @@ def test_tables_of_functions_patterns_arrays_and_cached_functions_count(tmp_path
     before = source_digest.digest([module(tmp_path, SOURCE).chosen])
     assert source_digest.digest([module(tmp_path, SOURCE).chosen]) == before, "the same in each process"
     assert source_digest.digest([module(tmp_path, changed(SOURCE, old, new)).chosen]) != before
+
+
+@pytest.mark.parametrize(("old", "new"), [("return 1", "return 5"), ("UNIT = 7", "UNIT = 8")])
+def test_what_a_method_takes_of_its_bases_and_its_class_counts(tmp_path: Path, old: str, new: str) -> None:
+    before = source_digest.digest([module(tmp_path, SOURCE).Look().lifted])
+    assert source_digest.digest([module(tmp_path, changed(SOURCE, old, new)).Look().lifted]) != before
+
+
+@pytest.mark.parametrize(("old", "new"), [("size=4", "size=5"), ("self.a = 1", "self.a = 2"), ('"a" +', '"b" +'),
+                                          ('{{"x", "y"}}', '{{"x", "z"}}'), ("EDGE = 6", "EDGE = 7")])
+def test_classes_sets_and_texts_that_a_function_uses_count(tmp_path: Path, old: str, new: str) -> None:
+    text = """
+CHOSEN = {{"x", "y"}}
+class Box:
+    EDGE = 6
+    def __init__(self):
+        self.a = 1
+def helper(size=4):
+    return size
+def make(scene, inputs, frames):
+    yield 0, (Box(), helper(), ["a" + n for n in inputs], CHOSEN)
+"""
+    before = source_digest.digest([module(tmp_path, text).make])
+    assert source_digest.digest([module(tmp_path, changed(text, old, new)).make]) != before
+
+
+def test_a_constant_without_a_text_of_its_own_is_refused(tmp_path: Path) -> None:
+    """Its key would be another in every process, and all would be made again in every run."""
+    text = "class Thing:\n    pass\nTHING = Thing()\ndef make(scene, inputs, frames):\n    yield 0, THING\n"
+    with pytest.raises(TypeError, match="a constant that keys cannot know"):
+        source_digest.digest([module(tmp_path, text).make])
+
+
+def test_digests_are_the_same_in_every_process() -> None:
+    code = ("from pathlib import Path; from pipeline.scene import load; from pipeline.stages import graph_of; "
+            "from pipeline.tables import PROJECT_SCENES; from pipeline.build import keys; "
+            "g = graph_of(load(PROJECT_SCENES / 'ma13-fig08.toml', True), Path('none')); "
+            "print([keys.constant(a, g.variants[v], made) for v, made in g.artifacts.items() for a in made.values()])")
+    found = {subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                            env=os.environ | {"PYTHONHASHSEED": seed}).stdout for seed in ("1", "2")}
+    assert len(found) == 1 and len(found.pop()) > 1000
+
+
+def test_the_reader_that_runs_in_a_child_and_the_compiled_writer_count() -> None:
+    from pipeline.files import meshes, volumes
+
+    assert "pipeline.files.mesh_repair.closed" in set(source_digest.sources([meshes.read_solid]).values())
+    assert "pipeline/files/openvdb.cpp" in set(source_digest.sources([volumes.write_field]).values())
 
 
 def test_an_import_inside_a_function_is_followed(tmp_path: Path) -> None:
@@ -157,20 +213,6 @@ def test_a_module_of_synth_brings_its_kernels_and_all_it_imports() -> None:
 
 
 # -- what really runs -----------------------------------------------------------------------------------------------
-
-RIVER = changed(changed(SMOKE, 'kind = "lit"\nwidth = 32', 'kind = "particles"\nwidth = 32\nspp = 1'), '"input", ', "")
-RIVER += '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.2\n[particles]\ncount = 20\n'
-VOLUME = changed(changed(SMOKE, 'kind = "lit"\nwidth = 32', 'kind = "volume"\nwidth = 16\nheight = 16\nspp = 1'),
-                 "m = 2\n", "m = 2\ndepth = { reach = 0.2 }\nsources = [{ centre = [0.0, 0.5], radius = 0.3 }]\n")
-SPACE = SMOKE.replace("frames = 3", "frames = 2").replace("size = [8, 8]", "size = [8, 4, 8]").replace(
-    "size = [16, 16]", 'size = [16, 8, 16]\nfacing = "density"').replace('"rotation"', '"constant"').replace(
-    '["input", "coarse", "result"]', '["detail-arrows", "result"]').replace(
-    'kind = "lit"\nwidth = 32',
-    'kind = "seaweed"\nwidth = 32\nheight = 18\nspp = 1\n[blades]\nspacing = 0.4\nwindow = 2')
-SPACE = SPACE.replace("m = 2\n", "m = 2\nsources = [{ centre = [0.0, 0.5, 0.0], radius = 0.3 }]\n")
-POTENTIAL = changed(changed(SMOKE, "iterations = 1", 'iterations = 1\nsynthesize = "potential"'),
-                    '"coarse", "result"', '"detail-divergence", "combined-colour"')
-LAGRANGIAN = changed(SMOKE, "iterations = 1", 'iterations = 1\nsamples = "lagrangian"')
 
 
 class Trace:
@@ -196,7 +238,7 @@ class Trace:
             elif place.parts[0] == "pipeline":
                 module = ".".join(place.with_suffix("").parts)
                 name = code.co_qualname.split(".<locals>")[0]
-                if not module.startswith(source_digest.COMPUTES_NOTHING) and "<" not in name:
+                if not f"{module}.".startswith(source_digest.COMPUTES_NOTHING) and "<" not in name:
                     found.add(f"{module}.{name}")
         return found
 
@@ -213,7 +255,7 @@ def traced(run: Callable[..., Iterator[Any]]) -> Callable[..., Iterator[Any]]:
             finally:
                 sys.setprofile(None)
                 threading.setprofile(None)
-            RAN.setdefault((variant, name), set()).update(trace.places())
+            RAN[variant, name] = RAN.pop((variant, name), set()) | trace.places()  # the last is in work
             if value is None:
                 return
             yield value
@@ -224,28 +266,37 @@ def traced(run: Callable[..., Iterator[Any]]) -> Callable[..., Iterator[Any]]:
 RAN: dict[tuple[str, str], set[str]] = {}
 
 
+def traced_save(save: Callable[..., None]) -> Callable[..., None]:
+    def wrapped(self: Format, file: Path, value: Any) -> None:
+        trace = Trace()
+        sys.setprofile(trace)
+        try:
+            save(self, file, value)
+        finally:
+            sys.setprofile(None)
+        RAN[list(RAN)[-1]].update(trace.places())  # that of the artifact in work
+
+    return wrapped
+
+
 def is_property(place: str, scene: Any) -> bool:
     """Whether it is a property of the scene: its value is in the key, so its code need not be."""
     _, _, name = place.rpartition(".")
     return isinstance(inspect.getattr_static(type(scene), name, None), property)
 
 
-SCENES = {"smoke": SMOKE, "river": RIVER, "volume": VOLUME, "space": SPACE, "potential": POTENTIAL,
-          "lagrangian": LAGRANGIAN, "beads": BEADS, "fish": FISH, "noodles": NOODLES, "paper": PAPER}
-
-
 @pytest.mark.parametrize("text", SCENES.values(), ids=SCENES)
 def test_all_code_that_runs_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     RAN.clear()
     monkeypatch.setattr(graph.BuildGraph, "run", traced(graph.BuildGraph.run))
+    monkeypatch.setattr(Format, "save", traced_save(Format.save))
     made = tiny.made(tmp_path, text, "render")
     assert RAN
     for (variant, name), ran in RAN.items():
         scene, one = made.variants[variant], made.artifacts[variant][name]
         functions = [one.make, one.format.write,
                      *(made.artifacts[variant][other].format.read for other, _ in one.inputs)]
-        tables = keys._tables([value_at(scene, read) for read in one.reads])
-        known = set(source_digest.sources(functions, tables).values()) | checks(one)
+        known = set(source_digest.sources(functions, keys.tables(one, scene)).values()) | checks(one)
         unknown = {place for place in ran - known if not is_property(place, scene)}
         assert not unknown, f"{name}: {sorted(unknown)}"
 

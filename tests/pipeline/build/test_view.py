@@ -72,11 +72,14 @@ def test_a_table_that_is_not_there_is_none() -> None:
     assert seen("nothing.a").nothing is None
 
 
-def test_methods_of_a_table_that_is_declared_in_part_see_the_view() -> None:
-    assert seen("inner.a", "inner.factor").inner.product() == 3
-    with pytest.raises(Undeclared, match=r"thing reads inner\.factor"):
-        seen("inner.a").inner.product()
-    assert seen("inner.a").inner.named() == "Inner"
+def test_methods_can_be_called_only_of_a_table_that_is_declared_as_a_whole() -> None:
+    """Of another its code would not count."""
+    assert seen("inner").inner.product() == 3
+    assert seen("inner").inner.named() == "Inner"
+    for name in ("product", "named"):
+        with pytest.raises(Undeclared, match=rf"thing reads inner\.{name}"):
+            getattr(seen("inner.a", "inner.factor").inner, name)
+    assert seen("inner.factor").inner.factor == 3
 
 
 def test_a_dotted_key_is_followed_in_a_scene_and_in_its_view() -> None:
