@@ -113,7 +113,7 @@ def rows_of(file: Path, quick: bool = False) -> list[dict[str, Any]]:
         else:
             example = in_detail(example)
             given, seen = map(of_threads if example.topology == "thread" else of_sheets, (example, output))
-        found.append({"scene": loaded.name, "variant": variant, **row(example, output, given, seen)})
+        found.append({"scene": loaded.file.stem, "variant": variant, **row(example, output, given, seen)})
     return found
 
 

@@ -4,10 +4,8 @@ In the order data passes through them:
 
     cli           one command for each thing below; exit codes
     tables        what every scene is written in
-    methods       the methods there are
     flow          the flow that a scene lives in: coarse motion and obstacles
-    motion        scenes of motion fields (ma09)
-    elements      scenes of elements (ma13)
+    methods       the methods there are; each is a folder, as `motion` (ma09) and `elements` (ma13)
     scene         a TOML file, checked, as one scene for each variant
     stages        synth, bake, render and figure, in order
     build         which files a scene needs, which are up to date, making the others; knows no method

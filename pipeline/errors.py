@@ -1,7 +1,7 @@
 """What can go wrong for a user, and the exit code of each.
 
 0 done, 1 differs (`flowloom diff`), 2 bad input, 3 the environment lacks something, 4 storage or memory,
-130 interrupted (SIGINT), 143 terminated (SIGTERM). Each error is one line on stderr.
+130 interrupted (SIGINT), 143 terminated (SIGTERM); 70 is a fault of flowloom itself. Each error is one line on stderr.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field, Strict
 
 from pipeline.build.artifact import Artifact, Inputs, Needs, Reads
@@ -20,8 +21,6 @@ from pipeline.tables import Asset, Grid, Radius, SceneTables, Table, grid, key, 
 from synth.field import Field as MotionField
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from synth import obstacle
 
 OUTLINE = 1024  # rows of the mask that an SVG is filled into
@@ -61,19 +60,10 @@ class Motion(Table):
         for frame, values in enumerate(motion, start=1):
             if frame in frames:
                 if "solid" in inputs and not self.passes_obstacles:
-                    before = _projected(scene, inputs, values, before)
+                    if before is None or not np.array_equal(before[0], values):  # a steady flow is projected once
+                        before = values, past_obstacles(scene, inputs, values)
                     values = before[1]
                 yield frame, MotionField.centred(values, scene.dimension).per_second(scene.fps)
-
-
-def _projected(scene: SceneInFlow, inputs: Inputs, values: np.ndarray,
-               before: tuple[np.ndarray, np.ndarray] | None) -> tuple[np.ndarray, np.ndarray]:
-    """`values`, and the same with no flow through the obstacles; a steady flow, as `before`, is projected once."""
-    import numpy as np
-
-    if before is not None and np.array_equal(before[0], values):
-        return before
-    return values, past_obstacles(scene, inputs, values)
 
 
 def past_obstacles(scene: SceneInFlow, inputs: Inputs, L: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Progress:
-    """Shows one bar per product on a terminal; says nothing when `quiet` or when stderr is a pipe or a file."""
+    """Shows one bar per artifact on a terminal; says nothing when `quiet` or when stderr is a pipe or a file."""
 
     quiet: bool = False
 

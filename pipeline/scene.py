@@ -50,11 +50,6 @@ class Scenes:
     method: Method
     variants: dict[str, Any]
 
-    @property
-    def name(self) -> str:
-        """The file's stem, which names the make target, the output folder and the pictures."""
-        return self.file.stem
-
 
 @dataclass(frozen=True)
 class Overrides:
@@ -234,7 +229,7 @@ def _figure_fits(method: Method, scene: Any) -> Faults:
         yield "figure.frame", f"the animation has {scene.frames} frames"
     panels = len(method.panels(scene))
     if figure.labels and len(figure.labels) != panels:
-        yield "figure.labels", f"{len(figure.labels)} labels for {panels} panels"
+        yield "figure.labels", f"{len(figure.labels)} labels, but {panels} panel{'s' if panels != 1 else ''}"
 
 
 ONE_FIGURE = ("fps", "figure.frame", "figure.animation", "figure.columns")

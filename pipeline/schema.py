@@ -172,5 +172,6 @@ def heading(path: str, model: type[BaseModel]) -> str:
 def table_of(path: str, model: type[BaseModel]) -> str:
     """A table in Markdown."""
     purpose = " ".join((model.__doc__ or "").split())
-    rows = [row(name, field) for name, field in model.model_fields.items()]
+    fields = sorted(model.model_fields.items(), key=lambda field: field[0] != "kind")
+    rows = [row(name, field) for name, field in fields]
     return "\n".join([f"### {heading(path, model)}", "", purpose, "", *HEAD, *rows, ""])

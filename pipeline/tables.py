@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib.metadata
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict, ValidationInfo
 
@@ -145,7 +145,8 @@ class Look(Table):
     """What is drawn, and how: the base of all [render] tables. A look is one class: its keys, what it draws, its
     pictures."""
 
-    width: int = key("width of the picture", 960, "pixels", ge=16, le=LARGEST)
+    if TYPE_CHECKING:
+        width: int
 
     path_traced: ClassVar[bool] = True
     """Whether Mitsuba renders it."""
@@ -167,6 +168,14 @@ class Look(Table):
         from render import backend
 
         return {"llvm": "none", **backend.versions("scalar_rgb")}  # a scalar variant does without
+
+
+class Framed(Table):
+    """The keys of a look that a camera frames."""
+
+    width: int = key("width of the picture", 960, "pixels", ge=16, le=LARGEST)
+    height: int = key("height of the picture", 540, "pixels", ge=16, le=LARGEST)
+    spp: int = key("paths per pixel", 64, ge=1, le=65536)
 
 
 def listed(size: Sequence[int]) -> str:

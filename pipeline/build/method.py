@@ -1,4 +1,4 @@
-"""What a method hands to the build: one record, which pipeline/methods.py lists. Nothing else names a method."""
+"""What a method hands to the build: one record, which pipeline/methods.py lists. No other file names a method."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ and its coarse motion. A new look is one class here, its place in `Render`, a mo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
@@ -20,7 +21,7 @@ from pipeline.elements.tables import ElementsScene
 from pipeline.files import images, meshes, usd
 from pipeline.files.meshes import Mesh
 from pipeline.flow import solid_input
-from pipeline.tables import LARGEST, Look, key, listed
+from pipeline.tables import LARGEST, Framed, Look, key, listed
 from synth.elements.samples import Elements
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ class ElementsLook(Look):
         return exemplar.topology in (None, cls.draws) and exemplar.dimension in (None, cls.dimension)
 
     def radius(self, scene: ElementsScene) -> float | None:
-        """Of an element of the middle size, heights; None: as the exemplar has it."""
+        """Median radius of an element, heights; None: as the exemplar has it."""
         return None
 
     # -- meshes
@@ -234,7 +235,7 @@ class BeadsRender(ElementsLook):
         from synth.elements import mesh
 
         points = elements.positions[frame, :, 0]
-        if scene.elements.toroidal and not exemplar:  # an exemplar lies in its own unit
+        if scene.elements.toroidal and not exemplar:  # an exemplar has its own period
             width = scene.cells[0] / scene.cells[1]
             points = np.stack([np.mod(points[:, 0] + width / 2, width) - width / 2, points[:, 1]], axis=-1)
         return mesh.solids(points, elements.size, cls._colours(scene, elements, exemplar))
@@ -274,15 +275,13 @@ class BeadsRender(ElementsLook):
         return self.picture(mesh, corners, Ground(tuple(corners[0]), tuple(corners[1])), shot)
 
 
-class SchoolRender(ElementsLook):
+class SchoolRender(Framed, ElementsLook):
     """Fish under water."""
 
     default_size: ClassVar[float] = 0.8
     mesh_reads: ClassVar[Reads] = ("render.speed", "elements.spacing", "seed")
 
     kind: Literal["school"] = key("fish in the sea")
-    width: int = key("width of the picture", 960, "pixels", ge=16, le=LARGEST)
-    height: int = key("height of the picture", 540, "pixels", ge=16, le=LARGEST)
     spp: int = key("paths per pixel", 128, ge=1, le=65536)
     speed: float = key("speed at which the school swims along x; the picture follows it", 2.2, "spacings per second",
                        ge=0, le=1000)
@@ -320,16 +319,13 @@ class SchoolRender(ElementsLook):
         return school.inset(**mesh, low=low, high=high, shot=shot)
 
 
-class NoodlesRender(ElementsLook):
+class NoodlesRender(Framed, ElementsLook):
     """Noodles on a plate."""
 
     draws: ClassVar[Literal["none", "thread", "sheet"]] = "thread"
     default_size: ClassVar[float] = 0.38
 
     kind: Literal["noodles"] = key("noodles in a studio")
-    width: int = key("width of the picture", 960, "pixels", ge=16, le=LARGEST)
-    height: int = key("height of the picture", 540, "pixels", ge=16, le=LARGEST)
-    spp: int = key("paths per pixel", 64, ge=1, le=65536)
 
     @classmethod
     def mesh(cls, scene: ElementsScene, elements: Elements, frame: int, exemplar: bool = False) -> Any:
@@ -338,8 +334,6 @@ class NoodlesRender(ElementsLook):
         return mesh.tubes(elements.positions[frame], elements.size, elements.colour)
 
     def picture(self, mesh: Mesh, extent: np.ndarray, ground: Any, shot: Shot) -> np.ndarray:
-        from dataclasses import replace
-
         from render import noodles
 
         camera, plate = noodles.view(extent[0], extent[1], shot.aspect)
@@ -355,7 +349,7 @@ class NoodlesRender(ElementsLook):
 SHARES = (0.40, 0.25, 0.14, 0.12, 0.09)  # of the sheets, of each colour of render.paper.PALETTE
 
 
-class PaperRender(ElementsLook):
+class PaperRender(Framed, ElementsLook):
     """Sheets of paper in the air."""
 
     draws: ClassVar[Literal["none", "thread", "sheet"]] = "sheet"
@@ -363,9 +357,6 @@ class PaperRender(ElementsLook):
     mesh_reads: ClassVar[Reads] = ("render.colour", "seed")
 
     kind: Literal["paper"] = key("paper in a studio")
-    width: int = key("width of the picture", 960, "pixels", ge=16, le=LARGEST)
-    height: int = key("height of the picture", 540, "pixels", ge=16, le=LARGEST)
-    spp: int = key("paths per pixel", 64, ge=1, le=65536)
     colour: Literal["exemplar", "mixed"] = key(
         "colour of a sheet: that of the element it was copied from, or one of a few that go together, at random",
         "mixed")
@@ -395,8 +386,6 @@ class PaperRender(ElementsLook):
         return lambda frame: {"sheets": mesh.shells(_surface(elements, frame - 1), elements.size, colours)}
 
     def picture(self, mesh: Mesh, extent: np.ndarray, ground: Any, shot: Shot) -> np.ndarray:
-        from dataclasses import replace
-
         from render import paper, studio
 
         camera = studio.framing(extent[0], extent[1], paper.CAMERA, shot.aspect)

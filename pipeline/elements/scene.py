@@ -24,7 +24,7 @@ class Scene(ElementsScene):
     elements: Elements
     coarse: Annotated[NoiseMotion | WakeMotion | AnalyticMotion | FileMotion | Carried,
                       Field(discriminator="kind")] | None = key(
-        "the coarse motion; none: elements are carried nowhere", None)
+        "the coarse motion; none: elements do not move", None)
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = key(
         "solids that elements keep out of, an array of tables [[obstacles]]", (), max_length=64)
     synthesis: Synthesis = Synthesis()
@@ -47,7 +47,7 @@ def for_points_alone(scene: Scene) -> Faults:
     if scene.render.draws == "none":
         return
     table, kind = scene.elements, scene.render.kind
-    reason = f"is for points; {kind} follow their [coarse] motion"
+    reason = f"applies to points only; {kind} follow their [coarse] motion"
     unused = {"elements.domain": table.domain, "elements.toroidal": table.toroidal, "elements.pins": table.pins,
               "elements.selections": table.selections, "elements.control": table.control,
               "obstacles": scene.obstacles}

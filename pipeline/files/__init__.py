@@ -1,4 +1,4 @@
-"""Files: each format has one home, and no file is ever half there.
+"""Files: each format has one home, and no file is ever partly written.
 
 format       a file format as a value
 atomic       how every file comes into being: written beside its place, checked, then renamed

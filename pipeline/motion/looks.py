@@ -18,7 +18,7 @@ from pipeline.files import images
 from pipeline.flow import solid_input, walls
 from pipeline.motion import bake
 from pipeline.motion.tables import MotionScene
-from pipeline.tables import LARGEST, Look, Share, key, listed
+from pipeline.tables import LARGEST, Framed, Look, Share, key, listed
 
 
 class MotionLook(Look):
@@ -34,7 +34,7 @@ class MotionLook(Look):
         table: Any = self
         size = listed(scene.cells)
         if scene.dimension not in self.dimensions:
-            reason = (f"draws a plane; detail.size is {size}" if scene.dimension == 3 else
+            reason = (f"renders 2-D fields only; detail.size is {size}" if scene.dimension == 3 else
                       f"needs a field in space; detail.size is {size}")
             yield "render.kind", f'"{table.kind}" {reason}'
         if scene.dimension == 2 and (scene.density.depth is not None) != self.draws_volume:
@@ -142,15 +142,12 @@ class VolumeRender(SmokeLook):
             camera=studio.CAMERA if self.elevation is None else studio.raised(self.elevation)))
 
 
-class SeaweedRender(MotionLook):
+class SeaweedRender(Framed, MotionLook):
     """The blades under water, path-traced by Mitsuba."""
 
     dimensions: ClassVar[tuple[int, ...]] = (3,)
 
     kind: Literal["seaweed"] = key("blades under water")
-    width: int = key("width of the picture", 960, "pixels", ge=16, le=LARGEST)
-    height: int = key("height of the picture", 540, "pixels", ge=16, le=LARGEST)
-    spp: int = key("paths per pixel", 64, ge=1, le=65536)
 
     def artifacts(self, scene: MotionScene) -> tuple[Artifact, ...]:
         return bake.blades_artifact(scene), Artifact(

@@ -153,17 +153,11 @@ def make_field_picture(scene: MotionScene, inputs: Inputs, frames: list[int], wh
 
 def _values(scene: MotionScene, inputs: Inputs, frame: int, what: str, exemplar: str) -> np.ndarray:
     """The field of a panel, any unit."""
-    match what:
-        case "exemplar":
-            values = inputs.read(exemplar).values
-        case "coarse":
-            values = inputs.read("L", frame).values
-        case "detail":
-            values = transformed(scene, inputs, frame, upsampled(inputs.read("L", frame), scene))
-        case _:
-            values = inputs.read("F", frame).values
-    found: np.ndarray = values
-    return found
+    if what == "detail":
+        return transformed(scene, inputs, frame, upsampled(inputs.read("L", frame), scene))
+    name = exemplar or {"coarse": "L", "combined": "F"}[what]
+    values: np.ndarray = inputs.read(name, 0 if exemplar else frame).values
+    return values
 
 
 def _slice(values: np.ndarray, scene: MotionScene) -> np.ndarray:

@@ -108,7 +108,7 @@ class Scene(MotionScene):
 
 
 def fits_its_dimension(scene: Scene) -> Faults:
-    """What is for a field in the plane and what is for one in space."""
+    """Keys that apply only in 2-D or only in 3-D."""
     detail, density = scene.detail, scene.density
     size = listed(detail.size)
     if scene.dimension == 2:

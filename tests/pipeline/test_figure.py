@@ -91,7 +91,7 @@ def test_the_figure_is_made_again_where_what_it_shows_changes_and_not_otherwise(
 
 
 def test_too_few_or_too_many_labels_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"figure.labels: 1 labels for 2 panels"):
+    with pytest.raises(BadInput, match=r"figure.labels: 1 labels, but 2 panels"):
         figure(tmp_path, '["exemplar", "coarse"]', 'labels = ["one"]\n')
 
 

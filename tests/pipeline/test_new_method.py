@@ -78,7 +78,7 @@ def test_its_scenes_run_through_every_stage(tmp_path: Path) -> None:
 def test_its_mistakes_are_told_as_all_others(tmp_path: Path) -> None:
     assert tiny.complaint(tiny.written(tmp_path, TEXT.replace("period", "peroid"))) == (
         "stripes.peroid: unknown key; did you mean period?")
-    with pytest.raises(BadInput, match=r"figure\.labels: 2 labels for 1 panels"):
+    with pytest.raises(BadInput, match=r"figure\.labels: 2 labels, but 1 panel"):
         scene.load(tiny.written(tmp_path, TEXT + '[figure]\nlabels = ["a", "b"]\n'))
 
 

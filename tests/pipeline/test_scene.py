@@ -150,7 +150,7 @@ def test_a_good_scene_in_space(tmp_path: Path, views: str) -> None:
     (TOP + SIDE + 'exemplar = { kind = "heart", size = 8 }\n[variants.a]\n"detail.levels" = 3',
      'variants."a"."detail.levels": 3 levels bring an exemplar of 8² below 4 cells'),
     ("[density]\ndepth = {}", "density.depth: gives a plane a body; detail.size is 16×32×16, which has one"),
-    ('[variants.a]\nrender = { kind = "lit" }', 'variants."a"."render".kind: "lit" draws a plane'),
+    ('[variants.a]\nrender = { kind = "lit" }', 'variants."a"."render".kind: "lit" renders 2-D fields only'),
     ('[variants.a]\n"detail.synthesize" = "potential"', 'variants."a"."detail.synthesize": "potential" is for a field'),
     ('[variants.a]\n"detail.samples" = "lagrangian"', 'variants."a"."detail.samples": "lagrangian" is for a field'),
     ('[variants.a]\n"detail.size" = [16, 32, 8]', 'variants."a"."detail.size": 16×32×8 has not the shape of'),

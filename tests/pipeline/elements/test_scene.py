@@ -67,7 +67,7 @@ ROUND = 'domain = { kind = "ball", centre = CENTRE, radius = 0.3 }'
     (BEADS, '"analytic"\nflow = "rotation"', '"wake"', 'coarse.kind: "wake" needs a stone'),
     (BEADS, '["result"]', '["result"]\nframe = 4', "figure.frame: the animation has 3 frames"),
     (FISH, '["result"]', '["coarse"]', 'figure.panels: there is no "coarse" without a [coarse]'),
-    (BEADS, '["result"]', '["result"]\nlabels = ["a", "b"]', "figure.labels: 2 labels for 1 panels"),
+    (BEADS, '["result"]', '["result"]\nlabels = ["a", "b"]', "figure.labels: 2 labels, but 1 panel"),
     (FISH, "frames = 3", "frames = 1", "frames: an animation of school has 2 or more, not 1"),
     (BEADS, "frames = 3", "frames = 3\nfps = 0.5", "fps: should be greater than or equal to 1, not 0.5"),
     (BEADS, "iterations = 2", "neighborhood = 0.5", "synthesis.neighborhood: should be greater than or equal to 1"),
@@ -86,12 +86,12 @@ ROUND = 'domain = { kind = "ball", centre = CENTRE, radius = 0.3 }'
      'synthesis.after: is 0 with sequence = "frames": later frames are not there yet (figure 3)'),
     # what threads and sheets do not heed
     (NOODLES, "count = 4", "pins = [{ at = [0.0, 0.5, 0.0] }]",
-     "elements.pins: is for points; noodles follow their [coarse] motion"),
+     "elements.pins: applies to points only; noodles follow their [coarse] motion"),
     (NOODLES, "count = 4", "toroidal = true", "elements.toroidal: is for points"),
     (NOODLES, "count = 4", ROUND.replace("CENTRE", "[0.0, 0.5]"), "elements.domain: is for points"),
     (NOODLES, "count = 4", 'along = "centre"', "elements.along: is for points"),
     (PAPER, "[render]", '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.1\n[render]',
-     "obstacles: is for points; paper follow their [coarse] motion"),
+     "obstacles: applies to points only; paper follow their [coarse] motion"),
     (PAPER, "iterations = 1", 'sequence = "frames"',
      'synthesis.sequence: "frames" is for points; of paper all frames are synthesized together'),
 ])

@@ -29,9 +29,9 @@ def spelled(faults: Faults) -> list[str]:
 @pytest.mark.parametrize(("tables", "fault"), [
     ({"render": {"kind": "lit"}}, None), ({"render": {"kind": "ink"}}, None), ({"render": {"kind": "particles"}}, None),
     ({"render": {"kind": "volume"}, **DEEP}, None), (SPACE, None), (SPACE | {"render": {"kind": "seaweed"}}, None),
-    (SPACE | {"render": {"kind": "lit"}}, 'render.kind: "lit" draws a plane; detail.size is 16×16×16'),
-    (SPACE | {"render": {"kind": "ink"}}, 'render.kind: "ink" draws a plane; detail.size is 16×16×16'),
-    (SPACE | {"render": {"kind": "particles"}}, 'render.kind: "particles" draws a plane; detail.size is 16×16×16'),
+    (SPACE | {"render": {"kind": "lit"}}, 'render.kind: "lit" renders 2-D fields only; detail.size is 16×16×16'),
+    (SPACE | {"render": {"kind": "ink"}}, 'render.kind: "ink" renders 2-D fields only; detail.size is 16×16×16'),
+    (SPACE | {"render": {"kind": "particles"}}, 'render.kind: "particles" renders 2-D fields only; detail.size is 16×16×16'),
     ({"render": {"kind": "volume"}}, 'render.kind: "volume" needs a [density.depth]'),
     ({"render": {"kind": "lit"}, **DEEP}, 'render.kind: "lit" draws no volume, but density.depth is'),
     ({"render": {"kind": "ink"}, **DEEP}, 'render.kind: "ink" draws no volume, but density.depth is'),
