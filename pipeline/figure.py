@@ -55,24 +55,31 @@ class Figure:
         self.graph = graph
         self.scenes: dict[str, Any] = {name: SceneView(scene, READS, "the figure")
                                        for name, scene in graph.variants.items()}
-        self.panels = {name: graph.method.panels(scene) for name, scene in graph.variants.items()}
+        self._labelled = {name: self._with_labels(name, graph.method.panels(scene))
+                          for name, scene in graph.variants.items()}
         self.first = next(iter(self.scenes.values()))
         self.frames: int = max(scene.frames for scene in self.scenes.values())
         self.shown_frame: int = self.first.figure.frame or self.frames
 
-    @property
-    def places(self) -> list[tuple[str, Panel]]:
-        """(variant, panel) of the figure, in reading order."""
-        return [(variant, panel) for variant, panels in self.panels.items() for panel in panels]
+    def _with_labels(self, variant: str, panels: Sequence[Panel]) -> list[tuple[Panel, str]]:
+        labels = self.scenes[variant].figure.labels or [panel.label for panel in panels]
+        return list(zip(panels, labels, strict=True))
+
+    def panels(self, still: bool) -> dict[str, list[tuple[Panel, str]]]:
+        """The panels of each variant and their labels, in reading order, in the still or in the animation."""
+        hidden = "animation" if still else "still"
+        return {variant: [(panel, label) for panel, label in panels if panel.shown_in != hidden]
+                for variant, panels in self._labelled.items()}
 
     def key(self, frames: Sequence[int], still: bool = False) -> str:
         """What a figure of these frames depends on."""
-        panels = [[variant, self.scenes[variant].figure.labels, [asdict(panel) for panel in panels]]
-                  for variant, panels in self.panels.items()]
-        hashes = [self.graph.require(variant, name, self.frame_of(variant, name, frame)).sha256
-                  for variant, panel in self.places for frame in frames
+        places = [(variant, panel) for variant, panels in self.panels(still).items() for panel, _ in panels]
+        panels = [[variant, [[asdict(panel), label] for panel, label in panels]]
+                  for variant, panels in self.panels(still).items()]
+        hashes = [self.graph.require(variant, name, self.frame_of(variant, name, panel.frame or frame)).sha256
+                  for variant, panel in places for frame in frames
                   for name in (self.artifact(panel, still), panel.inset) if name]
-        read = {self.graph.artifacts[variant][panel.artifact].format.read for variant, panel in self.places}
+        read = {self.graph.artifacts[variant][panel.artifact].format.read for variant, panel in places}
         code = source_digest.digest([Figure.sheet, pictures.write, video.write, *read])
         return manifest.digest([panels, self.first.figure.columns, self.first.fps, hashes, code])
 
@@ -90,13 +97,12 @@ class Figure:
 
         several = len(self.scenes) > 1 or "" not in self.scenes
         shown = []
-        for variant, panels in self.panels.items():
-            labels = self.scenes[variant].figure.labels or [panel.label for panel in panels]
-            for number, (panel, label) in enumerate(zip(panels, labels, strict=True)):
+        for variant, panels in self.panels(still).items():
+            for number, (panel, label) in enumerate(panels):
                 named = variant if several and not number else label
                 shown.append(self._panel(variant, panel, frame, still, named))
         columns = self.first.figure.columns or len(shown)
-        row = len(next(iter(self.panels.values())))
+        row = len(next(iter(self.panels(still).values())))
         if several and row > 1:
             columns = row
         return layout.figure([shown[start:start + columns] for start in range(0, len(shown), columns)])
@@ -104,11 +110,11 @@ class Figure:
     def _panel(self, variant: str, panel: Panel, frame: int, still: bool, label: str) -> Any:
         from render import layout, lic, tonemap
 
-        light = self._light(variant, self.artifact(panel, still), frame)
+        light = self._light(variant, self.artifact(panel, still), panel.frame or frame)
         picture = layout.fitted(tonemap.to_display(light, panel.tone), panel.width)
         inset = None
         if panel.inset:
-            light = self._light(variant, panel.inset, frame)
+            light = self._light(variant, panel.inset, panel.frame or frame)
             inset = layout.fitted(tonemap.to_display(light, "filmic"), round(INSET * panel.width))
         return layout.Panel(picture, label, inset=inset, legend=lic.wheel(panel.width // 6) if panel.legend else None)
 

@@ -344,6 +344,13 @@ def make_solid(scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterato
     yield 0, MotionField.centred(obstacle.union(solids).distance / scene.shape[-2], scene.dimension)
 
 
+def upsampled(L: MotionField, scene: SceneInFlow) -> np.ndarray:
+    """L (Y, X, 2) or (Z, Y, X, 3) on the scene's cells, cells per frame."""
+    from synth.motion.coarse import upsample
+
+    return upsample(L.per_frame(scene.fps).values, scene.shape)
+
+
 def walls(scene: SceneInFlow, inputs: Inputs) -> np.ndarray | None:
     """Cells of H to the nearest wall, negative inside, (Y, X) or (Z, Y, X) float32; None without obstacles."""
     return inputs.read("solid").values * scene.shape[-2] if "solid" in inputs else None

@@ -21,6 +21,8 @@ class Panel:
     width     pixels
     legend    whether a colour wheel stands in its corner
     inset     the artifact in a corner of it, "" for none
+    frame     the frame that it always shows, 0 for that of the figure
+    shown_in  "still" or "animation" alone, or "both"
     """
 
     label: str
@@ -30,6 +32,8 @@ class Panel:
     still: str = ""
     legend: bool = False
     inset: str = ""
+    frame: int = 0
+    shown_in: Literal["both", "still", "animation"] = "both"
 
 
 @dataclass(frozen=True)

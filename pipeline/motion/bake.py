@@ -17,8 +17,8 @@ import numpy as np
 from pipeline.build.artifact import Artifact, Inputs, Needs
 from pipeline.files import fields, meshes
 from pipeline.files.meshes import Mesh
-from pipeline.flow import solid_input, walls
-from pipeline.motion.fields import LOCAL_AXES, smoke_input, sources, towards, upsampled
+from pipeline.flow import solid_input, upsampled, walls
+from pipeline.motion.fields import LOCAL_AXES, smoke_input, sources, towards
 from pipeline.motion.tables import MotionScene
 from synth.field import Field, domain_origin
 

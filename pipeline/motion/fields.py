@@ -16,7 +16,7 @@ import numpy as np
 from pipeline.build.artifact import Artifact, Frames, Inputs, Needs
 from pipeline.build.view import value_at
 from pipeline.files import fields
-from pipeline.flow import solid_input, walls
+from pipeline.flow import solid_input, upsampled, walls
 from pipeline.motion.tables import MotionScene
 from synth.field import Field, domain_origin
 
@@ -150,17 +150,10 @@ def _state(state_type: type, arrays: Mapping[str, np.ndarray]) -> Any:
     return state_type(**lists)
 
 
-# -- L and the local axes on the cells of H -----------------------------------------------------------------------
+# -- the local axes on the cells of H -----------------------------------------------------------------------
 
 LOCAL_AXES = ("shape", "dimension", "detail.along", "detail.facing", "detail.directions", "fps")
 """The keys that the coordinate transformation depends on."""
-
-
-def upsampled(L: Field, scene: MotionScene) -> np.ndarray:
-    """L (Y, X, 2) or (Z, Y, X, 3) on the cells of H, cells per frame."""
-    from synth.motion.coarse import upsample
-
-    return upsample(L.per_frame(scene.fps).values, scene.shape)
 
 
 def towards(scene: MotionScene, inputs: Inputs, frame: int) -> np.ndarray:

@@ -15,9 +15,9 @@ from pipeline.build.artifact import Artifact, Inputs, Needs
 from pipeline.build.method import Panel
 from pipeline.build.view import value_at
 from pipeline.files import images, pictures
-from pipeline.flow import solid_input
+from pipeline.flow import solid_input, upsampled
 from pipeline.motion.bake import transformed
-from pipeline.motion.fields import LOCAL_AXES, smoke_input, upsampled
+from pipeline.motion.fields import LOCAL_AXES, smoke_input
 from pipeline.motion.looks import walls_or_far
 from pipeline.motion.tables import MotionScene
 

@@ -13,7 +13,7 @@ from pipeline import cli, flow
 from pipeline.build.graph import computed
 from pipeline.errors import BadInput
 from pipeline.files import images, meshes, pictures, volumes
-from pipeline.motion.fields import upsampled
+from pipeline.flow import upsampled
 from pipeline.scene import load
 from synth import obstacle
 from synth.field import Field, domain_origin

@@ -131,8 +131,8 @@ def places(folder: Path, text: str, name: str) -> set[str]:
      {"synth/elements/neighborhood.py", "synth/elements/arrangement.py"}),
     (SMOKE.replace('"coarse"', '"detail"'), "detail-lines",
      {"synth/motion/coarse.py", "synth/motion/local_axes.py", "pipeline.motion.bake.transformed",
-      "pipeline.motion.fields.upsampled"}),
-    (SMOKE, "F", {"pipeline.motion.fields.upsampled", "pipeline.flow.walls", "synth/motion/combine.py"}),
+      "pipeline.flow.upsampled"}),
+    (SMOKE, "F", {"pipeline.flow.upsampled", "pipeline.flow.walls", "synth/motion/combine.py"}),
     (SMOKE, "density", {"pipeline.motion.fields.sources", "synth/motion/density.py", "synth/motion/density.cl"}),
 ])
 def test_the_code_of_an_artifact_is_all_that_computes_it(tmp_path: Path, text: str, name: str,
