@@ -281,7 +281,9 @@ class Synthesis:
             raise ValueError(f"a mask of shape {mask.shape} on a picture of {self.shape}")
         open_ = None if mask is None or mask.all() else np.ascontiguousarray(mask, bool)
         v = np.asarray(v, np.float32)
-        moving = np.isfinite(v).all(axis=2) & (v != 0).any(axis=2)
+        size = np.abs(v[..., 0]) + np.abs(v[..., 1])
+        # false for what is no number
+        moving = (size > 0) & (size < np.inf)
         if open_ is not None:
             moving &= open_
         if moving.all():

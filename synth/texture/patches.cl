@@ -12,6 +12,7 @@
 #pragma OPENCL FP_CONTRACT OFF  // a fused multiply-add would round differently from the reference
 
 #define NEVER 1e30f
+#define FARTHEST 1e29f  // where nothing reaches, even that lies far behind
 #define LANES (float16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 
 // A patch's table: fraction of its centre beyond its cell, axis t, bends, anchor in the sample, 1 / r^2, steepness,
@@ -163,7 +164,7 @@ kernel void draw(global const int *restrict starts, global const int *restrict m
                  global const float *restrict tones, const float blend, global const uchar *restrict open,
                  const int2 size, global float *restrict picture) {
     TILED;
-    float16 nearest = (float16)(NEVER);
+    float16 nearest = (float16)(FARTHEST);
     for (int k = first; k < end; k++) {
         FROM_CENTRE;
         float16 e = remoteness(s, m, p, p[BIAS]);
@@ -212,7 +213,7 @@ kernel void strongest(global const int *restrict starts, global const int *restr
                       const float2 last, global const uchar *restrict open, const int2 size,
                       global float *restrict maps) {
     TILED;
-    float16 nearest = (float16)(NEVER);
+    float16 nearest = (float16)(FARTHEST);
     for (int k = first; k < end; k++) {
         FROM_CENTRE;
         float16 e = remoteness(s, m, p, p[BIAS]);
@@ -261,7 +262,7 @@ kernel void owners(global const int *restrict starts, global const int *restrict
                    global const int2 *restrict cells, global const float *restrict patches, const int when,
                    global const uchar *restrict open, const int2 size, global int *restrict owner) {
     TILED;
-    float16 nearest = (float16)(NEVER);
+    float16 nearest = (float16)(FARTHEST);
     int16 who = (int16)(-1);
     for (int k = first; k < end; k++) {
         FROM_CENTRE;
@@ -352,7 +353,7 @@ kernel void rectify(global const int *restrict who, global const int *restrict w
 #else
 #define HIDE_PLACES(counts)
 #endif
-    float16 nearest = (float16)(NEVER);
+    float16 nearest = (float16)(FARTHEST);
     for (int k = starts[q]; k < starts[q + 1]; k++) {
         FROM_THIS;
         HIDE_PLACES(e < nearest);
