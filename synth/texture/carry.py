@@ -118,7 +118,7 @@ class Settings:
             raise ValueError(f"patches grow for at least 1 frame, not {self.growth}")
         if self.usage < 0 or self.sharpness <= 0 or self.head_start < 0 or self.torn < 0 or self.repairs < 0:
             raise ValueError("usage, head_start, torn and repairs are not negative, sharpness is positive")
-        if self.blend != "auto" and not 0 <= self.blend <= 1:
+        if self.blend != "auto" and (isinstance(self.blend, str) or not 0 <= self.blend <= 1):
             raise ValueError(f'blend is "auto" or in 0..1, not {self.blend!r}')
         if not 0 <= self.repair <= 1:
             raise ValueError(f"repair is a share of the patches, not {self.repair}")
@@ -621,9 +621,10 @@ class Synthesis:
     def _blended(self, now: State) -> State:
         """The state with the share of the variance-preserving blend that gives the sample's gradient.
 
-        The root of the mean squared gradient is taken as linear between the two blends.
+        The root of the mean squared gradient is taken as linear between the two blends. A picture of less than 3 x 3
+        pixels has none.
         """
-        if self.settings.blend != "auto":
+        if self.settings.blend != "auto" or min(self.shape) < 3:
             return now
         plain, full = (np.sqrt(measures.gradient(luminance(self.picture(replace(now, blend=b)), self.sample.white),
                                                  self._reference)) for b in (0.0, 1.0))

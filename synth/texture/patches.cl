@@ -446,8 +446,9 @@ inline float turned(float2 from, float2 to) {
 }
 
 kernel void directions(global const float2 *restrict v, const int2 size, global const float2 *restrict points,
-                       const float step, global float4 *restrict out) {
+                       const int count, const float step, global float4 *restrict out) {
     const int k = get_global_id(0);
+    if (k >= count) return;
     const float x = points[k].x, y = points[k].y;
     const float2 here = flow_at(v, size, x, y);
     const float speed = sqrt(here.x * here.x + here.y * here.y);

@@ -43,6 +43,8 @@ SPREAD = 6
 """Pixels round an anchor that count as used."""
 LEAST_ERROR = 1e-3
 """Of the mean squared difference over the sample's variance: below, only use decides."""
+TOGETHER = 16
+"""Work-items of a group of `directions`. All sizes of groups are given: some devices compile a kernel anew for each."""
 STEP = 2.0
 """Pixels to each side over which the flow's angle is differenced."""
 
@@ -223,7 +225,7 @@ class Painter:
         """Sites that no living patch is near: (tiles, 16) bool; `bare_reference` says which."""
         rows, columns = self.tiles
         out = opencl.empty((rows * columns, 16), np.uint8)
-        self._program(open_).bare((rows * columns,), None, *_uploaded(lists), *_uploaded(table),
+        self._program(open_).bare((rows * columns,), (1,), *_uploaded(lists), *_uploaded(table),
                                   opencl.to_device(living.astype(np.uint8)), opencl.to_device(radii),
                                   np.float32(distance), np.int32(columns), *self._mask(open_), out)
         return out.get().astype(bool)
@@ -233,7 +235,7 @@ class Painter:
         """The picture's luminance at the places of each query: device (Q, places, 2); see `rectify_reference`."""
         places = self.places
         out = opencl.zeros((len(query.who), places.padded, 2))
-        self._program(open_).rectify((places.padded // 16, len(query.who)), None, *_uploaded(query), *places.on_device,
+        self._program(open_).rectify((places.padded // 16, len(query.who)), (1, 1), *_uploaded(query), *places.on_device,
                                      *_uploaded(lists), opencl.to_device(rank), np.int32(below), *_uploaded(table),
                                      *self._luminance_on_device, self.turn, self.last, *self._mask(open_), out)
         return out
@@ -275,8 +277,10 @@ class Painter:
         """Axis and change of angle along and across: (M, 4) float32; `directions_reference` says how. v on the device."""
         out = opencl.empty((len(points), 4))
         if len(points):
-            self._program(None).directions((len(points),), None, v, np.array(self.shape[::-1], np.int32),
-                                           opencl.to_device(points.astype(np.float32)), np.float32(STEP), out)
+            self._program(None).directions((-(-len(points) // TOGETHER) * TOGETHER,), (TOGETHER,), v,
+                                           np.array(self.shape[::-1], np.int32),
+                                           opencl.to_device(points.astype(np.float32)), np.int32(len(points)),
+                                           np.float32(STEP), out)
         return out.get()
 
 
