@@ -82,8 +82,8 @@ def _subdivided(values: np.ndarray, satisfied: Callable[[np.ndarray], np.ndarray
         if good.all():
             break
         size //= 2
-        quarter = np.array([0, size])
-        y, x = (np.add.outer(y[~good], np.repeat(quarter, 2)).ravel(), np.add.outer(x[~good], np.tile(quarter, 2)).ravel())
+        y = np.add.outer(y[~good], [0, 0, size, size]).ravel()
+        x = np.add.outer(x[~good], [0, size, 0, size]).ravel()
         inside = (y < shape[0]) & (x < shape[1])
         y, x = y[inside], x[inside]
     x, y, sizes = (np.concatenate(part).astype(np.int32) for part in zip(*found, strict=True))

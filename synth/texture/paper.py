@@ -18,10 +18,9 @@ up early.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from scipy import ndimage
@@ -291,7 +290,10 @@ def paste_reference(patch: np.ndarray, hole: np.ndarray, weight: np.ndarray, sur
 
 @dataclass(frozen=True)
 class Moved:
-    """What cells carried to each pixel; arbitrary in holes. Arrays as in `State`; picture (Y, X, 4): colour, luminance."""
+    """What cells carried to each pixel, as in `State`; arbitrary in holes.
+
+    picture (Y, X, 4) float32: colour and luminance.
+    """
 
     picture: np.ndarray
     direction: np.ndarray
@@ -427,7 +429,8 @@ class Synthesis:
         # steps 2 and 3
         v = flow.limited(np.where(texture[..., None], v, 0), self.settings.least, self.settings.most)
         carried = moved(state, v, angles, texture, self.settings)
-        canvas = Canvas(carried.picture, texture & ~carried.holes, carried.blendings, carried.direction, self.settings.n)
+        canvas = Canvas(carried.picture, texture & ~carried.holes, carried.blendings, carried.direction,
+                        self.settings.n)
         seeds = np.random.Generator(np.random.Philox(key=[self.seed, state.number + 1]))
         self._fill(canvas, self._hole_jobs(carried.holes, angles, seeds), blends=True)
         # step 4
@@ -542,11 +545,3 @@ def _fitting(settings: Settings, outside: np.ndarray, sample: Sample) -> Setting
     height, width = sample.shape
     raise ValueError(f"a sample of {width} x {height} pixels is too small: turned, it must hold whole squares of "
                      f"{settings.smallest} + 2 x {settings.D} pixels")
-
-
-def frames(synthesis: Synthesis, flows: Iterator[np.ndarray]) -> Iterator[State]:
-    """One state for each of `flows`."""
-    state: State | None = None
-    for v in flows:
-        state = synthesis.frame(v, state)
-        yield state
