@@ -5,6 +5,7 @@ from __future__ import annotations
 from pipeline.build.method import Method
 from pipeline.elements.method import METHOD as ELEMENTS
 from pipeline.motion.method import METHOD as MOTION
+from pipeline.texture.method import METHOD as TEXTURE
 
-METHODS: tuple[Method, ...] = (MOTION, ELEMENTS)
+METHODS: tuple[Method, ...] = (MOTION, ELEMENTS, TEXTURE)
 """The first is that of a scene that has no method's table."""

@@ -12,6 +12,8 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MODULES = sorted(p for top in ("pipeline", "synth", "render", "bench") for p in (ROOT / top).rglob("*.py"))
 
+METHODS = {f"pipeline/{file.parent.name}" for file in (ROOT / "pipeline").glob("*/method.py")} - {"pipeline/build"}
+
 HOMES = {
     "mitsuba": {"render/backend.py"},
     "drjit": {"render/backend.py"},
@@ -26,10 +28,11 @@ HOMES = {
     "svgpathtools": {"synth/motion/strokes.py"},
     "mujoco": {"synth/elements/simulation.py"},
     "pxr": {"pipeline/files/usd.py"},
+    "h5netcdf": {"pipeline/files/netcdf.py"},
     "rlic": {"render/lic.py"},
     "threadpoolctl": {"synth/motion/neighborhood.py", "synth/elements/assignment.py"},
     "cyclopts": {"pipeline/cli.py"},
-    "pydantic": {"pipeline/tables.py", "pipeline/flow.py", "pipeline/motion/", "pipeline/elements/",  # tables,
+    "pydantic": {"pipeline/tables.py", "pipeline/flow.py", *(f"{method}/" for method in METHODS),  # tables,
                  "pipeline/scene.py", "pipeline/schema.py"},  # filling them, writing them down
     "rich": {"pipeline/progress.py"},
     "faiss": {"bench/"},  # a peer that the bench runs beside us
@@ -42,7 +45,6 @@ MAY_IMPORT = {
     "pipeline": {"pipeline", "render", "synth"},
     "bench": {"bench", "pipeline", "render", "synth"},
 }
-METHODS = {f"pipeline/{file.parent.name}" for file in (ROOT / "pipeline").glob("*/method.py")} - {"pipeline/build"}
 IN_BUILD = {"pipeline.build", "pipeline.files", "pipeline.errors", "pipeline.progress", "synth"}
 NOT_IN_METHODS = {"subprocess", "multiprocessing", "socket", "shutil", "tempfile", "logging", "tomllib"}
 VAGUE = {"utils", "util", "common", "helpers", "helper", "core", "base", "misc", "tools"}

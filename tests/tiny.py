@@ -134,8 +134,28 @@ SPACE = SPACE.replace("m = 2\n", "m = 2\nsources = [{ centre = [0.0, 0.5, 0.0], 
 POTENTIAL = changed(changed(SMOKE, "iterations = 1", 'iterations = 1\nsynthesize = "potential"'),
                     '"coarse", "result"', '"detail-divergence", "combined-colour"')
 LAGRANGIAN = changed(SMOKE, "iterations = 1", 'iterations = 1\nsamples = "lagrangian"')
+TEXTURE = """\
+title = "Canes that turn"
+frames = 3
+[sample]
+kind = "canes"
+size = 32
+[coarse]
+kind = "analytic"
+flow = "rotation"
+size = [16, 16]
+[texture]
+size = [64, 48]
+[figure]
+panels = ["sample", "flow", "result"]
+panel = 32
+"""
+TEXTURE = TEXTURE.replace("size = [16, 16]", "size = [16, 12]")
+BY_PAPER = changed(TEXTURE, "size = [64, 48]", 'size = [64, 48]\nmethod = "paper"').replace(
+    '"flow", "result"', '"holes", "result"').replace("panel = 32", "panel = 32\nmoments = [1, 3]")
 SCENES = {"smoke": SMOKE, "river": RIVER, "volume": VOLUME, "space": SPACE, "potential": POTENTIAL,
-          "lagrangian": LAGRANGIAN, "beads": BEADS, "fish": FISH, "noodles": NOODLES, "paper": PAPER}
+          "lagrangian": LAGRANGIAN, "beads": BEADS, "fish": FISH, "noodles": NOODLES, "paper": PAPER,
+          "texture": TEXTURE, "texture by the paper": BY_PAPER}
 """Scenes that together have every stage, every look and every way to synthesize."""
 
 

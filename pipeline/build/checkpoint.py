@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.files import atomic
 
 State = dict[str, np.ndarray]
+FRAME, KEY = "checkpoint.frame", "checkpoint.key"  # beside the arrays of the state, whatever their names
 
 
 class Checkpoint:
@@ -27,7 +28,7 @@ class Checkpoint:
     def save(self, frame: int, state: Mapping[str, np.ndarray]) -> None:
         """Keep the state after `frame`, the artifact's last or the one that is in work."""
         with atomic.replacing(self._file) as temporary, temporary.open("wb") as content:
-            about = {"frame": np.array(frame), "key": np.array(self._key(frame))}
+            about = {FRAME: np.array(frame), KEY: np.array(self._key(frame))}
             np.savez(content, allow_pickle=False, **about, **state)
 
     def load(self, before: int | None = None) -> tuple[int, State] | None:
@@ -38,10 +39,10 @@ class Checkpoint:
         """
         try:
             with self._file.open("rb") as file, np.load(file, allow_pickle=False) as kept:
-                frame = int(kept["frame"])
-                if str(kept["key"]) != self._key(frame) or (before is not None and not 0 < frame < before):
+                frame = int(kept[FRAME])
+                if str(kept[KEY]) != self._key(frame) or (before is not None and not 0 < frame < before):
                     return None
-                return frame, {name: kept[name] for name in kept.files if name not in ("frame", "key")}
+                return frame, {name: kept[name] for name in kept.files if name not in (FRAME, KEY)}
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
             return None
 

@@ -1,0 +1,98 @@
+"""What synth makes of a scene of a moving texture, in out/X/fields: the frames, and what the figures show of them.
+
+All are pictures in linear light, top row first; synth.texture has the lowest row first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from pipeline.build.artifact import Artifact, Inputs
+from pipeline.files import images
+from pipeline.flow import solid_input, upsampled, walls
+from pipeline.texture.tables import TextureScene
+
+READS = ("texture", "sample.direction", "seed", "fps", "shape")
+
+
+def velocity(scene: TextureScene, inputs: Inputs, frame: int) -> np.ndarray:
+    """The velocity that the texture moves with (Y, X, 2), pixels per frame (§3)."""
+    from synth.texture import flow
+
+    L, table = upsampled(inputs.read("L", frame), scene), scene.texture
+    if table.speed == "normalized":
+        return flow.normalized(L, table.pace)
+    return flow.limited(L, table.slowest, table.fastest)
+
+
+def _sample(scene: TextureScene, inputs: Inputs) -> Any:
+    from synth.texture.sample import sample
+
+    degrees = scene.sample.direction
+    return sample(np.ascontiguousarray(inputs.read("sample")[::-1]),
+                  direction=None if degrees is None else np.radians(degrees))
+
+
+def make_by_paper(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The frames by the paper's method (§2)."""
+    from synth.texture import paper
+
+    yield from ((frame, synthesis.picture(state)[::-1]) for frame, synthesis, state in _states(
+        scene, inputs, frames, paper, scene.paper.settings()))
+
+
+def make_by_carry(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The frames by patches that carry coordinates into the sample."""
+    from synth.texture import carry
+
+    yield from ((frame, synthesis.picture(state)[::-1]) for frame, synthesis, state in _states(
+        scene, inputs, frames, carry, scene.carry.settings()))
+
+
+def make_holes(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The frames of the paper's method with their holes in black (figure 5)."""
+    from synth.texture import paper
+
+    for frame, synthesis, state in _states(scene, inputs, frames, paper, scene.paper.settings()):
+        shown = np.where(synthesis.holes(state)[..., None], np.float32(0), synthesis.picture(state))
+        yield frame, shown[::-1]
+
+
+def _states(scene: TextureScene, inputs: Inputs, frames: list[int], method: Any, settings: Any,
+            ) -> Iterator[tuple[int, Any, Any]]:
+    """(frame, synthesis, state) of each of `frames`. An interrupted run goes on from the last state: same bits."""
+    synthesis = method.Synthesis(_sample(scene, inputs), scene.shape, settings, scene.seed)
+    distance = walls(scene, inputs)
+    mask = None if distance is None else distance > 0
+    kept = inputs.checkpoint.load(before=frames[0])
+    done, state = (kept[0], method.State.of(kept[1])) if kept else (0, None)
+    for frame in range(done + 1, frames[-1] + 1):
+        state = synthesis.frame(velocity(scene, inputs, frame), state, mask)
+        if frame in frames:
+            yield frame, synthesis, state
+        if frame < frames[-1]:
+            inputs.checkpoint.save(frame, state.arrays())
+
+
+def make_flow_picture(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The lines of the flow."""
+    from render import lic, tonemap
+
+    for frame in frames:
+        yield frame, tonemap.from_srgb(lic.picture(inputs.read("L", frame).values, scene.figure.panel, scene.seed))
+
+
+def frame_artifacts(scene: TextureScene) -> tuple[Artifact, ...]:
+    """The frames; the holes and the flow where the figure shows them."""
+    needs: Any = (("sample", "once"), ("L", "until"), *solid_input(scene))
+    make: Callable[..., Any] = make_by_paper if scene.texture.method == "paper" else make_by_carry
+    made = [Artifact("frames", "synth", images.LIGHT, (*READS, scene.texture.method), needs, make)]
+    if "holes" in scene.figure.panels:
+        made.append(Artifact("holes", "synth", images.LIGHT, (*READS, "paper"), needs, make_holes))
+    if "flow" in scene.figure.panels:
+        made.append(Artifact("flow-lines", "render", images.LIGHT, ("figure.panel", "seed"), (("L", "same"),),
+                             make_flow_picture))
+    return tuple(made)

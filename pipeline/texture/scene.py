@@ -1,0 +1,44 @@
+"""A scene of a moving texture (wang05), all its tables together, and what does not fit together in them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, Strict
+
+from pipeline.build.method import Faults
+from pipeline.flow import Coarse, Obstacle
+from pipeline.tables import key, listed
+from pipeline.texture.samples import Sample
+from pipeline.texture.tables import Carry, Figure, Paper, Texture, TextureScene
+
+
+class Scene(TextureScene):
+    """A scene of a moving texture: keys above the first table."""
+
+    sample: Sample = Field(discriminator="kind")
+    coarse: Coarse = Field(discriminator="kind")
+    obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = key(
+        "where there is no texture: solids, an array of tables [[obstacles]]", (), max_length=64)
+    texture: Texture = Texture()
+    carry: Carry = Carry()
+    paper: Paper = Paper()
+    figure: Figure = Figure()
+
+
+def texture_fits(scene: Scene) -> Faults:
+    """Check: sizes, speeds and moments."""
+    texture, size = scene.texture, scene.sample.size
+    if size > min(texture.size):
+        yield "sample.size", f"a sample of {size}² is larger than the picture ({listed(texture.size)})"
+    if texture.slowest > texture.fastest:
+        yield "texture.slowest", f"is above texture.fastest, {texture.fastest:g}"
+    if scene.carry.radius[0] > scene.carry.radius[1]:
+        yield "carry.radius", "has its least after its largest"
+    if scene.paper.smallest > scene.paper.largest:
+        yield "paper.smallest", f"is above paper.largest, {scene.paper.largest}"
+    if "holes" in scene.figure.panels and texture.method != "paper":
+        yield "figure.panels", 'there are no "holes" with texture.method = "carry"'
+    for number, moment in enumerate(scene.figure.moments):
+        if moment > scene.frames:
+            yield f"figure.moments[{number}]", f"the animation has {scene.frames} frames"

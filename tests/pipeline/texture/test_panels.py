@@ -1,0 +1,26 @@
+"""Panels of moving textures: the still shows the result at its moments, the animation the result."""
+
+from pathlib import Path
+
+from tiny import BY_PAPER, TEXTURE, changed, scene
+
+from pipeline.texture.panels import panels
+
+
+def test_without_moments_the_result_stands_in_both(tmp_path: Path) -> None:
+    found = panels(scene(tmp_path, TEXTURE))
+    assert [(p.artifact, p.frame, p.shown_in) for p in found] == [
+        ("sample", 0, "both"), ("flow-lines", 0, "both"), ("frames", 0, "both")]
+    assert [p.width for p in found] == [16, 32, 32]
+
+
+def test_with_moments_the_still_has_one_for_each(tmp_path: Path) -> None:
+    found = panels(scene(tmp_path, BY_PAPER))
+    assert [(p.label, p.frame, p.shown_in) for p in found[2:]] == [
+        ("frame 1", 1, "still"), ("frame 3", 3, "still"), ("result", 0, "animation")]
+    assert found[1].artifact == "holes"
+
+
+def test_all_are_display_values(tmp_path: Path) -> None:
+    text = changed(TEXTURE, "panel = 32", "panel = 32\nmoments = [2]")
+    assert {panel.tone for panel in panels(scene(tmp_path, text))} == {"straight"}

@@ -1,0 +1,30 @@
+"""Scenes of moving textures: one line for what does not fit together."""
+
+from pathlib import Path
+
+import pytest
+from tiny import TEXTURE, changed, complaint, written
+
+from pipeline.scene import load
+
+
+def test_a_table_texture_makes_it_a_scene_of_them(tmp_path: Path) -> None:
+    loaded = load(written(tmp_path, TEXTURE))
+    one = loaded.variants[""]
+    assert loaded.method.name == "wang05"
+    assert (one.dimension, one.shape, one.texture.method, one.seed) == (2, (48, 64), "carry", 1)
+
+
+@pytest.mark.parametrize(("old", "new", "told"), [
+    ("size = 32\n", "size = 64\n", "sample.size: a sample of 64² is larger than the picture (64×48)"),
+    ("size = [64, 48]", "size = [64, 48]\nslowest = 3.0", "texture.slowest: is above texture.fastest, 2.2"),
+    ("size = [64, 48]", "size = [64, 48]\n[carry]\nradius = [9, 7]", "carry.radius: has its least after its largest"),
+    ("size = [64, 48]", "size = [64, 48]\n[paper]\nsmallest = 40", "paper.smallest: is above paper.largest, 32"),
+    ("size = [64, 48]", "size = [64, 64]", "texture.size: 64×64 has not the shape of coarse.size, 16×12"),
+    ('"flow", "result"', '"holes", "result"', 'figure.panels: there are no "holes" with texture.method = "carry"'),
+    ("panel = 32", "panel = 32\nmoments = [4]", "figure.moments[0]: the animation has 3 frames"),
+    ('"canes"', '"cane"', "sample.kind: unknown kind 'cane'; did you mean canes?"),
+    ("[texture]", "[texture]\nmethod = \"papr\"", "texture.method: 'papr' is not one of them; did you mean paper?"),
+])
+def test_what_does_not_fit_is_one_line(tmp_path: Path, old: str, new: str, told: str) -> None:
+    assert complaint(written(tmp_path, changed(TEXTURE, old, new))) == told
