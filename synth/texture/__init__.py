@@ -8,6 +8,7 @@ In the order data passes through them:
     flow        direction of the flow, its speed within limits, motion along it (§2.2, §3)
     cells       squares over which direction or velocity differ little, for the paper's method (§2.1, §2.2.1)
     paper       the paper's method: colours that are carried in cells (§2)
+    patches     what patches of a sample cover and show, and which place of it continues a picture
     carry       ours: places in the sample that are carried in patches
     measures    how near a frame is to its sample, and how well it moves
 

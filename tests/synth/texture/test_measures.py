@@ -1,5 +1,7 @@
 """The measures, by pictures whose numbers are known: the sample itself, shifted, blurred, faded, turned."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -56,6 +58,21 @@ def test_the_reference_is_a_mean_over_the_same_square(noise):
     np.testing.assert_allclose(noise._turned[0], noise.sample.luminance[20:108, 20:108], atol=1e-6)
     for name in ("contrast", "gradient", "laplacian"):
         assert getattr(measures, name)(noise.sample.luminance, noise) == pytest.approx(1, abs=0.08), name
+
+
+def test_the_reference_of_stripes_is_a_mean_over_turns():
+    """Of a wave A sin(k·x) the mean squared difference is A²/2 (sin² k_x + sin² k_y): least where upright."""
+    A, k = 0.3, 1.2
+    wave = np.broadcast_to(0.5 + A * np.sin(k * np.arange(128)), (128, 128))
+    reference = measures.Reference(replace(sample(np.random.default_rng(0).random((128, 128, 3))), luminance=wave))
+    turns = np.deg2rad([0, 13, 29, 45, 61])
+    expected = A**2 / 2 * (np.sin(k * np.cos(turns)) ** 2 + np.sin(k * np.sin(turns)) ** 2)
+    # 88 pixels hold no whole number of waves, and bicubic interpolation between pixels takes a little
+    assert reference.gradient == pytest.approx(expected.mean(), rel=0.03)
+    assert reference.gradient > 1.1 * expected[0]
+    deviations = [turned(wave, angle, 88).std() for angle in turns]
+    assert reference.contrast == pytest.approx(np.mean(deviations), rel=1e-6)
+    assert reference.contrast != pytest.approx(deviations[0], rel=1e-4)
 
 
 def test_known_gradients_and_laplacians():

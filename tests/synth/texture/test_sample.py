@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from synth.texture.sample import DIRECTED, luminance, main_direction, rotated, sample, share, turned
+from synth.texture.sample import (
+    DIRECTED,
+    luminance,
+    main_direction,
+    rotated,
+    sample,
+    share,
+    turned,
+    turned_places,
+)
 
 
 def stripes(angle, size=64, period=9.0):
@@ -174,6 +183,14 @@ def test_what_is_transparent_is_not_valid():
     copies = rotated(sample(noise((40, 40)), alpha, 0.0), 4)
     assert copies.valid[0].sum() == 1500
     assert 1300 < rotated(sample(noise((40, 40)), alpha, 0.0), 7).valid[3].sum() < 1450
+
+
+def test_valid_is_wholly_inside():
+    """Where bicubic interpolation has pixels on all sides, and nowhere else."""
+    copies = rotated(sample(noise((30, 44)), direction=0.7), 9)
+    for k in range(9):
+        y, x = turned_places((30, 44), copies.angles[k] - 0.7, copies.valid.shape[1])
+        np.testing.assert_array_equal(copies.valid[k], (x >= 0) & (x <= 43) & (y >= 0) & (y <= 29))
 
 
 def test_no_copies_are_refused():
