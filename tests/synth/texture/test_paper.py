@@ -128,6 +128,14 @@ def test_speeds_are_limited():
         np.testing.assert_array_equal(second.colour[8:-8, 16:-8], np.roll(first.colour, speed, 1)[8:-8, 16:-8])
 
 
+def test_what_moves_out_of_the_picture_at_once_is_replaced():
+    shape = (24, 30)
+    synthesis = Synthesis(stripes(), shape, replace(SMALL, most=5000.0), seed=1)
+    _, second, third = sequence(synthesis, constant(shape, 3000, 1000), 3)
+    assert second.holes.all() and second.resynthesized == 1 and (second.colour > 0.01).all()
+    assert np.abs(third.colour - second.colour).mean() > 0.01
+
+
 @pytest.mark.parametrize("k", range(8))
 def test_the_first_frame_points_along_the_flow(k):
     angle = 2 * np.pi * k / 8
