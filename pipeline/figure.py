@@ -115,7 +115,7 @@ class Figure:
         inset = None
         if panel.inset:
             light = self._light(variant, panel.inset, panel.frame or frame)
-            inset = layout.fitted(tonemap.to_display(light, "filmic"), round(INSET * panel.width))
+            inset = layout.fitted(tonemap.to_display(light, panel.tone), round(INSET * panel.width))
         return layout.Panel(picture, label, inset=inset, legend=lic.wheel(panel.width // 6) if panel.legend else None)
 
     def _light(self, variant: str, name: str, frame: int) -> np.ndarray:

@@ -5,7 +5,7 @@ All are pictures in linear light, top row first; synth.texture has the lowest ro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -52,6 +52,16 @@ def make_by_carry(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Ite
         scene, inputs, frames, carry, scene.carry.settings()))
 
 
+def make_by_pixels(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The paper's first frame, its pixels moved one by one along the flow of each frame (figure 3)."""
+    from synth.texture import paper
+
+    synthesis = paper.Synthesis(_sample(scene, inputs), scene.shape, scene.paper.settings(), scene.seed)
+    first = synthesis.picture(synthesis.frame(velocity(scene, inputs, 1), None))
+    for frame in frames:
+        yield frame, paper.moved_pixels(first, velocity(scene, inputs, frame), frame - 1)[::-1]
+
+
 def make_holes(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The frames of the paper's method with their holes in black (figure 5)."""
     from synth.texture import paper
@@ -85,13 +95,30 @@ def make_flow_picture(scene: TextureScene, inputs: Inputs, frames: list[int]) ->
         yield frame, tonemap.from_srgb(lic.picture(inputs.read("L", frame).values, scene.figure.panel, scene.seed))
 
 
+def make_zoom(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """A square of the frames, enlarged: each pixel is a block, so that nothing is smoothed (figure 7)."""
+    x, y, edge = scene.figure.zoom or (0.5, 0.5, 1.0)
+    rows, columns = scene.shape
+    side = max(8, min(round(edge * columns), rows, columns))
+    left = min(max(round(x * columns - side / 2), 0), columns - side)
+    top = min(max(round(rows - y * columns - side / 2), 0), rows - side)
+    block = max(1, scene.figure.panel // (2 * side))
+    for frame in frames:
+        part = inputs.read("frames", frame)[top:top + side, left:left + side]
+        yield frame, np.repeat(np.repeat(part, block, axis=0), block, axis=1)
+
+
 def frame_artifacts(scene: TextureScene) -> tuple[Artifact, ...]:
     """The frames; the holes and the flow where the figure shows them."""
     needs: Any = (("sample", "once"), ("L", "until"), *solid_input(scene))
-    make: Callable[..., Any] = make_by_paper if scene.texture.method == "paper" else make_by_carry
-    made = [Artifact("frames", "synth", images.LIGHT, (*READS, scene.texture.method), needs, make)]
+    make, keys = {"carry": (make_by_carry, "carry"), "paper": (make_by_paper, "paper"),
+                  "pixels": (make_by_pixels, "paper")}[scene.texture.method]
+    made = [Artifact("frames", "synth", images.LIGHT, (*READS, keys), needs, make)]
     if "holes" in scene.figure.panels:
         made.append(Artifact("holes", "synth", images.LIGHT, (*READS, "paper"), needs, make_holes))
+    if scene.figure.zoom:
+        made.append(Artifact("zoom", "render", images.LIGHT, ("figure.zoom", "figure.panel", "shape"),
+                             (("frames", "same"),), make_zoom))
     if "flow" in scene.figure.panels:
         made.append(Artifact("flow-lines", "render", images.LIGHT, ("figure.panel", "seed"), (("L", "same"),),
                              make_flow_picture))

@@ -8,16 +8,17 @@ from pipeline.texture.tables import TextureScene
 
 def panels(scene: TextureScene) -> tuple[Panel, ...]:
     """The panels of the scene's figure; with moments, in the still one result for each."""
-    full = scene.figure.panel
+    full, zoom = scene.figure.panel, "zoom" if scene.figure.zoom else ""
     known = {"sample": Panel("sample", "sample", full // 2, "straight"), "flow": Panel("flow", "flow-lines", full,
              "straight"), "holes": Panel("holes", "holes", full, "straight"), "result": Panel("result", "frames", full,
-             "straight")}
+             "straight", inset=zoom)}
     made: list[Panel] = []
     for name in scene.figure.panels:
         if name == "result" and scene.figure.moments:
-            made += [Panel(f"frame {moment}", "frames", full, "straight", frame=moment, shown_in="still")
+            made += [Panel(f"frame {moment}", "frames", full, "straight", inset=zoom, frame=moment,
+                           shown_in="still")
                      for moment in scene.figure.moments]
-            made.append(Panel("result", "frames", full, "straight", shown_in="animation"))
+            made.append(Panel("result", "frames", full, "straight", inset=zoom, shown_in="animation"))
         else:
             made.append(known[name])
     return tuple(made)

@@ -38,7 +38,7 @@ def texture_fits(scene: Scene) -> Faults:
     if scene.paper.smallest > scene.paper.largest:
         yield "paper.smallest", f"is above paper.largest, {scene.paper.largest}"
     if "holes" in scene.figure.panels and texture.method != "paper":
-        yield "figure.panels", 'there are no "holes" with texture.method = "carry"'
+        yield "figure.panels", f'there are no "holes" with texture.method = "{texture.method}"'
     for number, moment in enumerate(scene.figure.moments):
         if moment > scene.frames:
             yield f"figure.moments[{number}]", f"the animation has {scene.frames} frames"

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import Field, Strict
 
 from pipeline.flow import SceneInFlow
-from pipeline.tables import Cells, FigureTable, Table, key
+from pipeline.tables import Cells, FigureTable, Share, Table, key
 
+Share01 = Annotated[float, Field(ge=0, le=1)]
 Reach = Annotated[float, Field(ge=6, le=40)]
 
 
@@ -21,9 +22,9 @@ class Texture(Table):
     """The moving texture."""
 
     size: Annotated[tuple[Cells, Cells], Strict(False)] = key("columns and rows of the picture", (512, 512), "pixels")
-    method: Literal["carry", "paper"] = key(
+    method: Literal["carry", "paper", "pixels"] = key(
         "\"carry\": long-lived patches that carry coordinates into the sample; \"paper\": the paper's, which carries "
-        "colours", "carry")
+        "colours; \"pixels\": the paper's first frame, its pixels moved one by one (figure 3)", "carry")
     speed: Literal["limited", "normalized"] = key(
         "the flow's own, within slowest and fastest (§3), or the same everywhere (figures 8, 9 and 11)", "limited")
     slowest: float = key("least speed, with speed = \"limited\"", 0.3, "pixels per frame", ge=0, le=100)
@@ -91,6 +92,9 @@ class Figure(FigureTable):
     moments: Annotated[tuple[Annotated[int, Field(ge=1, le=100000)], ...], Strict(False)] = key(
         "frames at which the still shows the result (figure 8: 1, 30, 70, 100); none: figure.frame alone", (), "frames",
         max_length=16)
+    zoom: Annotated[tuple[Share01, Share01, Share], Strict(False)] | None = key(
+        "x and y of the middle and edge of a square of the result that is enlarged in its corner (figure 7); none: no "
+        "such view", None, "widths of the picture")
 
 
 class TextureScene(SceneInFlow):
