@@ -35,7 +35,7 @@ def test_a_run_makes_the_stages_before_first_and_checks_memory_and_files_of_all_
         tmp_path: Path, ran: list[tuple[str, Any]], stage: str) -> None:
     made(tmp_path, stage=stage)
     asked = stages.STAGES[: stages.STAGES.index(stage) + 1]
-    checks = [(f"{one} {what}", None) for one in asked for what in ("memory", "files")]
+    checks = [(f"{one} {what}", None) for what in ("memory", "files") for one in asked]
     assert ran == [*checks, *((one, None) for one in asked)]
 
 

@@ -87,9 +87,9 @@ ROUND = 'domain = { kind = "ball", centre = CENTRE, radius = 0.3 }'
     # what threads and sheets do not heed
     (NOODLES, "count = 4", "pins = [{ at = [0.0, 0.5, 0.0] }]",
      "elements.pins: applies to points only; noodles follow their [coarse] motion"),
-    (NOODLES, "count = 4", "toroidal = true", "elements.toroidal: is for points"),
-    (NOODLES, "count = 4", ROUND.replace("CENTRE", "[0.0, 0.5]"), "elements.domain: is for points"),
-    (NOODLES, "count = 4", 'along = "centre"', "elements.along: is for points"),
+    (NOODLES, "count = 4", "toroidal = true", "elements.toroidal: applies to points only"),
+    (NOODLES, "count = 4", ROUND.replace("CENTRE", "[0.0, 0.5]"), "elements.domain: applies to points only"),
+    (NOODLES, "count = 4", 'along = "centre"', "elements.along: applies to points only"),
     (PAPER, "[render]", '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.1\n[render]',
      "obstacles: applies to points only; paper follow their [coarse] motion"),
     (PAPER, "iterations = 1", 'sequence = "frames"',
@@ -101,7 +101,7 @@ def test_what_is_wrong_is_named_in_one_line(tmp_path: Path, text: str, old: str,
 
 @pytest.mark.parametrize(("text", "old", "new", "expected"), [
     (NOODLES, 'style = "jagged"\nframes = 4', 'file = "a.csv"\ncaptured = true',
-     "exemplar.captured: is for points, not for noodles"),
+     "exemplar.captured: applies to points only, not for noodles"),
     (NOODLES, 'count = 4\n[coarse]\nkind = "lifted"', 'count = 4\n[coarse]\nkind = "tracks"\nfile = "a.csv"',
      "elements.count: is that of coarse.file"),
 ])

@@ -108,7 +108,7 @@ def test_a_beauty_marched_for_the_animation_is_not_taken_for_one_path_traced_for
         one = scene({**VOLUME, "method": method}, **SPACE | {
             "figure": {"panels": ["result"], "animation": animation}})
         made = named(one)
-        return (keys.key(made["beauty"], one, made, 3, ["the density"]),
+        return (keys.key(keys.constant(made["beauty"], one, made), 3, ["the density"]),
                 keys.content_id(made["beauty"], one, ["the density"]))
 
     for animated, alone in zip(beauty(True), beauty(False), strict=True):
