@@ -20,6 +20,7 @@ prints tables, writes each part's section of bench/RESULTS.md, and out/bench.jso
     lagrangian   ma09 §5: detail at samples that move, beside detail on a grid
     elements     ma13: time, memory, growth, exemplars in their own domain, jitter
     fidelity     ma13: statistics of every scene beside those of its exemplar
+    texture      wang05: likeness to the sample, motion, time, growth, memory, and rlic beside it
 
     targets      rows of each part: the measured number, its target, the paper's or a peer's number
     results      the rows as Markdown, in the part's own section of RESULTS.md

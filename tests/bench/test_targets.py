@@ -7,6 +7,11 @@ import pytest
 from bench import results, targets
 
 TIMES = {"wall": 0.5, "processor": 0.9}
+LIKE = {"std": 0.98, "grad": 0.95, "hist": 0.04, "fwd": 0.22}
+MOVING = {"residual 50 %": 0.05, "residual 95 %": 0.09, "worst block": 0.5, "corr10": 0.995, "synthesised anew, %": 0.6,
+          "drift of bwd": 0.01, "drift of used": 0.02, "wall ms": 20, "processor ms": 15}
+TEXTURES = ("canes on circles", "straw on vortices", "brick on waves")
+SECONDS = {"first frame, wall s": 0.4, "first frame, processor s": 0.3, "wall ms": 20, "processor ms": 15}
 DISTANCES = {"pair correlation": 0.05, "motion spectrum": None, "nearest distance": 0.02}
 FOUND: dict[str, dict[str, Any]] = {
     "synthesis": {f"{search}, {frame}": TIMES for search in ("exact", "k-coherence") for frame in ("first", "next")} | {
@@ -39,6 +44,20 @@ FOUND: dict[str, dict[str, Any]] = {
     "fidelity": {"fidelity of scenes": [
         {"scene": "ma13-fig05", "variant": "pure", **DISTANCES, "motion spectrum": 0.07},
         {"scene": "ma13-fig10", "variant": "jagged", **DISTANCES}]},
+    "texture": {"foreign": ["rings on a spiral"], "floor": {"residual_50": 0.04, "residual_95": 0.067},
+                "frame by frame": [{"texture": name, "method": method, "frame": frame, **LIKE}
+                                   for name in (*TEXTURES, "rings on a spiral") for method in ("carry", "paper")
+                                   for frame in (1, 100)],
+                "in motion": [{"texture": name, "method": "carry", **MOVING}
+                              for name in (*TEXTURES, "rings on a spiral")] + [
+                    {"texture": name, "method": "paper", **MOVING, "worst block": 1.4, "wall ms": 700}
+                    for name in TEXTURES],
+                "time and memory": [{"size": "512²", **SECONDS, "peak memory MB": 210},
+                                    {"size": "1024²", **SECONDS, "peak memory MB": 400}],
+                "exponent": {"first frame": 1.02, "later frames": 0.97},
+                "beside rlic": {"ours": TIMES, "rlic": TIMES, "ratio": {"wall": 0.4, "processor": 0.3}},
+                "against the reference": {"size": "256²", "ours": TIMES, "reference": TIMES,
+                                          "largest difference": 0.0}},
 }
 
 
@@ -64,6 +83,62 @@ def test_rows_of_good_numbers_miss_no_target(part: str) -> None:
 def test_a_worse_number_misses_its_target(part: str, key: str, value: Any, missed: str) -> None:
     rows = list(targets.ROWS[part](FOUND[part] | {key: value}))
     assert [row.measured for row in rows if row.verdict == "MISSED"] == [missed]
+
+
+def changed(table: str, texture: str, **numbers: float) -> dict[str, Any]:
+    """What the texture part found, with other numbers of one texture of `carry`; for a frame table of frame 100."""
+    rows = [row | numbers if (row["texture"], row["method"], row.get("frame", 100)) == (texture, "carry", 100) else row
+            for row in FOUND["texture"][table]]
+    assert rows != FOUND["texture"][table]
+    return FOUND["texture"] | {table: rows}
+
+
+@pytest.mark.parametrize(("table", "texture", "key", "value", "what", "measured"), [
+    ("frame by frame", "brick on waves", "grad", 0.84, "figures: contrast and gradient",
+     "worst 0.84 (grad, brick on waves, frame 100); 2 of 3 within"),
+    ("frame by frame", "straw on vortices", "std", 1.11, "figures: contrast and gradient",
+     "worst 1.11 (std, straw on vortices, frame 100); 2 of 3 within"),
+    ("frame by frame", "rings on a spiral", "hist", 0.11, "foreign textures: histogram",
+     "worst 0.11 (rings on a spiral, frame 100); 0 of 1 within"),
+    ("frame by frame", "brick on waves", "fwd", 0.251, "brick: forward distance at frame 100", "0.251"),
+    ("in motion", "canes on circles", "worst block", 0.81, "figures: worst block",
+     "worst 0.81 (canes on circles); 2 of 3 within"),
+    ("in motion", "rings on a spiral", "synthesised anew, %", 2.1, "foreign textures: synthesised anew",
+     "worst 2.1 % (rings on a spiral); 0 of 1 within"),
+    ("in motion", "straw on vortices", "drift of used", 0.041, "figures: drift of the share",
+     "worst 0.041 (straw on vortices); 2 of 3 within"),
+    ("in motion", "straw on vortices", "drift of bwd", float("nan"), "figures: drift of the backward",
+     "worst nan (straw on vortices); 2 of 3 within"),
+    ("in motion", "canes on circles", "residual 95 %", 0.101, "canes on circles: residual", "0.101"),
+    ("in motion", "straw on vortices", "residual 50 %", 0.131, "straw on vortices: residual", "0.131"),
+    ("in motion", "straw on vortices", "corr10", 0.77, "straw on vortices: correlation", "0.770")])
+def test_one_bad_texture_misses_one_target_and_is_named(table: str, texture: str, key: str, value: float, what: str,
+                                                        measured: str) -> None:
+    missed = [row for row in targets.texture(changed(table, texture, **{key: value})) if row.verdict == "MISSED"]
+    assert [row.measured for row in missed] == [measured]
+    assert what in missed[0].what
+
+
+@pytest.mark.parametrize(("key", "value", "missed"), [
+    ("time and memory", [{"size": "512²", **SECONDS, "wall ms": 33.5}, {"size": "1024²", "peak memory MB": 400}],
+     "34 ms (15 ms of processor time)"),
+    ("time and memory", [{"size": "512²", **SECONDS, "first frame, wall s": 0.51},
+                         {"size": "1024²", "peak memory MB": 400}], "0.51 s (0.30 s of processor time)"),
+    ("time and memory", [{"size": "512²", **SECONDS}, {"size": "1024²", "peak memory MB": 501}], "501 MB"),
+    ("exponent", {"first frame": 1.06, "later frames": 0.97}, "1.06"),
+    ("beside rlic", {"ours": TIMES, "rlic": TIMES, "ratio": {"wall": 1.1, "processor": 0.3}},
+     "1.10 (0.30 by processor time)")])
+def test_a_slow_texture_misses_its_target(key: str, value: Any, missed: str) -> None:
+    rows = targets.texture(FOUND["texture"] | {key: value})
+    assert [row.measured for row in rows if row.verdict == "MISSED"] == [missed]
+
+
+def test_the_paper_s_method_is_measured_beside_ours_and_only_its_time_has_a_target() -> None:
+    slow = [row | {"wall ms": 1100} if row["method"] == "paper" and row["texture"] == "brick on waves" else row
+            for row in FOUND["texture"]["in motion"]]
+    rows = list(targets.texture(FOUND["texture"] | {"in motion": slow}))
+    assert [row.measured for row in rows if row.verdict == "MISSED"] == [
+        "1.10 s (0.01 s of processor time; brick on waves)"]  # not its worst block of 1.4
 
 
 def test_fidelity_names_the_worst_scene_and_sets_no_target() -> None:
