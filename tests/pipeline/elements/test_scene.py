@@ -101,7 +101,7 @@ def test_what_is_wrong_is_named_in_one_line(tmp_path: Path, text: str, old: str,
 
 @pytest.mark.parametrize(("text", "old", "new", "expected"), [
     (NOODLES, 'style = "jagged"\nframes = 4', 'file = "a.csv"\ncaptured = true',
-     "exemplar.captured: applies to points only, not for noodles"),
+     "exemplar.captured: is for points, not for noodles"),
     (NOODLES, 'count = 4\n[coarse]\nkind = "lifted"', 'count = 4\n[coarse]\nkind = "tracks"\nfile = "a.csv"',
      "elements.count: is that of coarse.file"),
 ])
@@ -129,7 +129,7 @@ def test_tracks_may_be_a_folder_whose_files_stay_inside(tmp_path: Path) -> None:
 
 
 def test_the_readmes_example_is_a_whole_scene(tmp_path: Path) -> None:
-    text = (PROJECT_SCENES / "README.md").read_text().split("## Scenes of elements\n")[1]
+    text = (PROJECT_SCENES / "README.md").read_text().split("## Scenes of elements\n")[1].split("\n## ")[0]
     example = [line.removeprefix("    ") for line in text.splitlines() if line.startswith("    ")]
     scene = load(written(tmp_path, "\n".join(example))).variants[""]
     assert isinstance(scene, Scene)

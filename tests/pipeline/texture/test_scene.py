@@ -2,10 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tiny import TEXTURE, changed, complaint, written
 
+from pipeline.files import pictures
 from pipeline.scene import load
+from pipeline.tables import PROJECT_SCENES
 
 
 def test_a_table_texture_makes_it_a_scene_of_them(tmp_path: Path) -> None:
@@ -28,3 +31,11 @@ def test_a_table_texture_makes_it_a_scene_of_them(tmp_path: Path) -> None:
 ])
 def test_what_does_not_fit_is_one_line(tmp_path: Path, old: str, new: str, told: str) -> None:
     assert complaint(written(tmp_path, changed(TEXTURE, old, new))) == told
+
+
+def test_the_readmes_example_is_a_whole_scene(tmp_path: Path) -> None:
+    text = (PROJECT_SCENES / "README.md").read_text().split("## Scenes of moving textures\n")[1]
+    example = [line.removeprefix("    ") for line in text.splitlines() if line.startswith("    ")]
+    pictures.write(tmp_path / "bark.png", np.random.default_rng(1).random((80, 80, 3)))
+    one = load(written(tmp_path, 'title = "Bark"\n' + "\n".join(example))).variants[""]
+    assert (one.sample.kind, one.coarse.kind, one.texture.size) == ("picture", "analytic", (512, 512))
