@@ -46,7 +46,6 @@ from synth.texture.patches import (
     Query,
     Table,
     sees_reference,
-    sites,
 )
 from synth.texture.sample import Sample, luminance
 
@@ -60,6 +59,8 @@ FIRST_SITES = 2
 """Pixels between the places that are tried for a birth in the first frame; later TILE / 4."""
 FEWEST = 8
 """Places with a picture that a newborn must have to be matched; with fewer its anchor is drawn at random."""
+LIVELY = 8.0
+"""σ, in pixels, of the round in which the sample's variance counts."""
 RING = (0.6, 0.8)
 """Radii between which a patch is compared with its neighbours."""
 WORN = 1.5
@@ -88,11 +89,11 @@ class Settings:
     """
 
     radius: tuple[float, float] = (6.0, 20.0)
-    elongation: float = 1.0
+    elongation: float = 1.5
     spacing: float = 1.0
     birth: float = 1.12
     death: float = 0.55
-    usage: float = 0.3
+    usage: float = 0.6
     growth: int = 8
     sharpness: float = 0.4
     head_start: float = 1.3
@@ -126,7 +127,7 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """All that the next frame and the picture need: P living patches, in order of birth, and what the sample was used for.
+    """All that the next frame and the picture need: P living patches, in order of birth, and the use of the sample.
 
     frame, born  number of this frame, from 1; patches born so far, which numbers the next
     blend        share of the blend that preserves variance
@@ -372,7 +373,8 @@ class Synthesis:
         now = replace(state, frame=state.frame + 1, centre=centre, weight=weight.astype(np.float32),
                       age=state.age + np.int32(1), mask=_kept(ground))
         now = replace(_chosen(now, stays), usage=self._used(state.usage, state.anchor[~stays], -1))
-        return replace(now, **self._turned(now.centre, ground))
+        turned: dict[str, Any] = self._turned(now.centre, ground)
+        return replace(now, **turned)
 
     def _used(self, usage: np.ndarray, anchors: np.ndarray, change: int) -> np.ndarray:
         """usage (H, W) with `change` added round each of anchors (M, 2)."""
@@ -450,9 +452,9 @@ class Synthesis:
         query = Query(who, who, places.count(RING[0] * radius), places.count(RING[1] * radius))
         shown = painter.rectify(table, painter.around(table, who, RING[1] * radius), query,
                                 np.zeros(len(now.id), np.int32), 1, ground.open).get()[:, :len(places.radii)]
-        x, y = np.moveaxis(now.anchor[who][:, None].astype(np.int64) + places.offsets, -1, 0)
-        height, width = self.sample.shape
-        own = self.sample.luminance[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)]
+        margin = int(np.abs(places.offsets).max(initial=0))
+        x, y = np.moveaxis(now.anchor[who][:, None].astype(np.int64) + places.offsets + margin, -1, 0)
+        own = painter.mirrored(margin)[y, x]
         index = np.arange(len(places.radii))
         asked = (index >= query.first[:, None]) & (index < query.end[:, None]) & (shown[..., 1] > 0)
         squared = np.where(asked, (shown[..., 0] - own).astype(np.float64) ** 2, 0).sum(axis=1)
@@ -496,7 +498,7 @@ class Synthesis:
                 self._cover(bare, place, radii, (j, i), centre, turned["axis"][j, i], covering, ground)
         now = self._with_newborns(now, np.array(births).reshape(-1, 2), ground)
         # 3. what is hidden from all
-        return now if ground.open is None else self._uncovered(now, ground)
+        return now if ground.open is None else self._uncovered(now, ground.open, ground)
 
     def _without(self, now: State, radii: np.ndarray, ground: Ground) -> np.ndarray:
         """Sites (rows, columns) of later frames that no living patch is near."""
@@ -523,33 +525,33 @@ class Synthesis:
             near &= seen.reshape(near.shape)
         bare[part] &= ~near
 
-    def _uncovered(self, now: State, ground: Ground) -> State:
+    def _uncovered(self, now: State, open_: np.ndarray, ground: Ground) -> State:
         """Adds patches until each pixel with texture has one that reaches it: at the first pixel, then the next."""
         while True:
             table = self._table(now, ground)
-            owner = self.painter.owners(table, self.painter.reaching(table), ground.open)
-            missing = np.argwhere((owner < 0) & ground.open)[:, ::-1].astype(np.float64)
+            owner = self.painter.owners(table, self.painter.reaching(table), open_)
+            missing = np.argwhere((owner < 0) & open_)[:, ::-1].astype(np.float64)
             if not len(missing):
                 return now
             births = []
             while len(missing):
                 births.append(missing[0])
                 near = np.hypot(*(missing - missing[0]).T) <= self.radius[0]
-                near &= sees_reference(np.asarray(ground.open), missing, np.broadcast_to(missing[0], missing.shape))
+                near &= sees_reference(open_, missing, np.broadcast_to(missing[0], missing.shape))
                 near[0] = True
                 missing = missing[~near]
             now = self._with_newborns(now, np.array(births), ground)
 
     def _with_newborns(self, now: State, centre: np.ndarray, ground: Ground) -> State:
-        """The patches and newborns at centres (B, 2), still without an anchor. In the first frame they are full-grown."""
+        """The patches and newborns at centres (B, 2), without an anchor yet; full-grown in the first frame."""
         count, first = len(centre), now.frame == 1
         newborn: dict[str, Any] = {
             "centre": centre, "anchor": np.full((count, 2), -1, np.float32),
             "weight": np.full(count, float(first), np.float32),
             "age": np.full(count, self.settings.growth if first else 0, np.int32), "fading": np.zeros(count, bool),
             "id": now.born + np.arange(count), "seam": np.full(count, -1, np.float32), **self._turned(centre, ground)}
-        return replace(now, born=now.born + count,
-                       **{name: np.concatenate([getattr(now, name), newborn[name]]) for name in PATCHES})
+        joined: dict[str, Any] = {name: np.concatenate([getattr(now, name), newborn[name]]) for name in PATCHES}
+        return replace(now, born=now.born + count, **joined)
 
     # 5. match
 
@@ -606,9 +608,22 @@ class Synthesis:
         return rounds
 
     def _dear(self, usage: np.ndarray) -> np.ndarray:
-        """λ times the use of each place of the sample over the mean use: (H, W) float32."""
+        """By what share the error at each anchor counts more, or less if negative: (H, W) float32.
+
+        1. λ times the use of each place of the sample over the mean use.
+        2. Divided by how lively the sample is there: the least squares alone prefer its dull parts, since of two
+           pictures that have nothing in common the difference is the sum of their variances.
+        """
         mean = usage.mean()
-        return (self.settings.usage * usage / mean if mean > 0 else np.zeros(usage.shape)).astype(np.float32)
+        used = self.settings.usage * usage / mean if mean > 0 else np.zeros(usage.shape)
+        return ((1 + used) / self._lively - 1).astype(np.float32)
+
+    @cached_property
+    def _lively(self) -> np.ndarray:
+        """Variance of the sample round each pixel plus that of the whole, over twice the latter: (H, W) float64."""
+        picture = self.sample.luminance.astype(np.float64)
+        squared = (picture - picture.mean()) ** 2
+        return 0.5 + 0.5 * ndimage.gaussian_filter(squared, LIVELY, mode="mirror") / squared.mean()
 
     def _anywhere(self, now: State, k: int) -> np.ndarray:
         """An anchor at random for patch k."""
@@ -645,7 +660,7 @@ def _nearest(field: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _inside(centre: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    return ((centre >= 0) & (centre <= np.array(shape[::-1]) - 1)).all(axis=1)
+    return np.asarray(((centre >= 0) & (centre <= np.array(shape[::-1]) - 1)).all(axis=1))
 
 
 def _kept(ground: Ground) -> np.ndarray:

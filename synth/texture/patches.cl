@@ -155,7 +155,8 @@ READ(CHANNELS)
 #endif
 
 // The picture (Y, X, CHANNELS): mean + gain * (sum of w (colour - mean)), where the gain goes by `blend` from 1 to
-// 1 / sqrt(sum of w^2), within [low, high]; zero where masked. Equal to the reference bit for bit.
+// 1 / sqrt(sum of w^2) as far as the patches differ, within [low, high]; zero where masked. tones: mean, low, high of
+// each channel, and UNLIKE over the sample's variance. Equal to the reference bit for bit.
 // starts (tiles + 1), members: the patches that reach each tile, in order; cells (P, 2): the pixel before each centre;
 // patches (P, FIELDS); sample (rows, columns, CHANNELS), enlarged; open (Y, X): where texture is
 kernel void draw(global const int *restrict starts, global const int *restrict members,
@@ -171,7 +172,7 @@ kernel void draw(global const int *restrict starts, global const int *restrict m
         HIDE(e, e < nearest);
         nearest = fmin(nearest, e);
     }
-    float16 sum = (float16)(0.0f), squares = sum, colour[CHANNELS];
+    float16 sum = (float16)(0.0f), squares = sum, power = sum, colour[CHANNELS];
     for (int c = 0; c < CHANNELS; c++) colour[c] = sum;
     for (int k = first; k < end; k++) {
         FROM_CENTRE;
@@ -184,17 +185,28 @@ kernel void draw(global const int *restrict starts, global const int *restrict m
         READ_COLOUR(CHANNELS)(sample, enlarged.x, enlarged.y, px, py, value);
         sum += w;
         squares += w * w;
-        for (int c = 0; c < CHANNELS; c++) colour[c] += w * (value[c] - tones[c]);
+        for (int c = 0; c < CHANNELS; c++) {
+            const float16 beyond = value[c] - tones[c];
+            colour[c] += w * beyond;
+            power += w * (beyond * beyond);
+        }
     }
     const int16 covered = sum > 0.0f;
     sum = select((float16)(1.0f), sum, covered);
     squares = select((float16)(1.0f), squares, covered);
-    const float16 gain = (1.0f - blend) + blend * (sum / sqrt(squares));
+    // how far the patches differ here, over what unlike ones would
+    float16 unlike = power / sum;
+    for (int c = 0; c < CHANNELS; c++) {
+        colour[c] /= sum;
+        unlike -= colour[c] * colour[c];
+    }
+    unlike = fmin(fmax(unlike * tones[3 * CHANNELS] / fmax(1.0f - squares / (sum * sum), 1e-6f), 0.0f), 1.0f);
+    const float16 gain = 1.0f + blend * unlike * (sum / sqrt(squares) - 1.0f);
     float out[CHANNELS][16];
     int shown[16];
     vstore16(covered, 0, shown);
     for (int c = 0; c < CHANNELS; c++)
-        vstore16(fmin(fmax(tones[c] + gain * (colour[c] / sum), tones[CHANNELS + c]), tones[2 * CHANNELS + c]), 0,
+        vstore16(fmin(fmax(tones[c] + gain * colour[c], tones[CHANNELS + c]), tones[2 * CHANNELS + c]), 0,
                  out[c]);
     for (int l = 0; l < min(TILE, size.x - x); l++) {
 #if MASKED
@@ -386,8 +398,8 @@ kernel void rectify(global const int *restrict who, global const int *restrict w
 
 // The best anchor of each query in each row of the sample: least (error + FLOOR) * (1 + dear), the leftmost of equals.
 // wanted (queries, P16, 2) as rectify gives it; offsets (P16): of each place from the anchor in `luminance`, which has
-// `stride` floats a row and begins at the sample's first pixel; room (rows, stride): pixels from each anchor to where
-// the sample ends; dear (rows, stride); needs (queries): the room each needs. best (queries, rows, 2): error, column.
+// `stride` floats a row and whose pixel 0, 0 is at `origin`; room and dear (rows, stride), of each anchor; needs
+// (queries): the room each needs. best (queries, rows, 2): error, column.
 // Equal to the reference bit for bit. Hot in the first frame only: bound by arithmetic and unaligned loads.
 kernel void match(global const float *restrict wanted, global const int *restrict from, global const int *restrict to,
                   global const int *restrict offsets, const int places, global const float *restrict luminance,

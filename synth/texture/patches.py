@@ -7,8 +7,12 @@ it shows the sample at a + Rot(θ_s) (U, V), where
     U = s + κ_t s m + κ_n m² / 2        V = m - κ_t s² / 2 - κ_n s m
 
 so that V = 0 is the streamline through its centre, to second order. Each pixel belongs to the patch that is least
-remote, e = steepness (ρ + growth · (1 - w)) + t⁴ / (1 - t), ρ = (s² / elongation + m² · elongation) / r², t = ρ over the
-square of the reach: a power diagram. Its neighbours have a share where they are less than 4 more remote, (1 - Δe / 4)⁴.
+remote,
+
+    e = steepness (ρ + head_start (1 - w)) + t⁴ / (1 - t)    ρ = (s² / elongation + m² elongation) / r²    t = ρ / reach²
+
+which is a power diagram where t is small; beyond t = 1 a patch shows nothing. Others have a share where they are less
+than 4 more remote, by (1 - Δe / 4)⁴, which is near exp(-Δe).
 
 Hot: `draw` is most of a frame (about 10 CPU ms for 512² pixels). It is bound by the reads of the sample, four for each
 patch that has a share in one of 16 pixels.
@@ -36,13 +40,19 @@ FX, FY, TX, TY, BEND_T, BEND_N, AX, AY, INVERSE, STEEP, BIAS, BEFORE, RADIUS, NE
 FIELDS = 16
 NEVER = np.float32(1e30)
 NEED = 1.25
-"""The sample must go on for so many radii round an anchor."""
+"""Radii round an anchor in which no pixel of the sample may be transparent."""
+EDGE = 0.6
+"""Radii from an anchor to the sample's edge, at least. Farther out a patch may show the sample mirrored; were more asked
+for, the sample's middle would be seen more often than its edges."""
 MATCHED = 1.15
 """Radius of the disc in which a newborn patch is compared with the picture, over the patch's radius."""
-SPREAD = 6
+SPREAD = 12
 """Pixels round an anchor that count as used."""
 LEAST_ERROR = 1e-3
 """Of the mean squared difference over the sample's variance: below, only use decides."""
+UNLIKE = 4.0
+"""Over how far patches differ in colour: where they differ by the sample's deviation over the root of this, or by more,
+the blend preserves all of the variance. Where they are alike it must add none: their seam would show."""
 TOGETHER = 16
 """Work-items of a group of `directions`. All sizes of groups are given: some devices compile a kernel anew for each."""
 STEP = 2.0
@@ -57,7 +67,7 @@ class Lists(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Patches as the kernels read them: cells (P, 2) int32, the pixel before each centre; values (P, FIELDS) float32."""
+    """Patches as kernels read them: cells (P, 2) int32, the pixel before each centre; values (P, FIELDS) float32."""
 
     cells: np.ndarray
     values: np.ndarray
@@ -99,12 +109,15 @@ class Painter:
 
     @cached_property
     def tones(self) -> np.ndarray:
-        """Mean, least and greatest of the sample's colours: (3, channels) float32."""
+        """Mean, least and greatest of the sample's colours, and UNLIKE over their variance: (4, channels) float32."""
         colour = self.sample.colour[..., :self.colour.shape[2]]
         if self.sample.opaque is not None:
             colour = colour[self.sample.opaque]
         colour = colour.reshape(-1, colour.shape[-1])
-        return np.stack([colour.mean(axis=0, dtype=np.float64), colour.min(axis=0), colour.max(axis=0)]).astype(np.float32)
+        mean = colour.mean(axis=0, dtype=np.float64)
+        variance = max(float(((colour - mean) ** 2).mean(axis=0).sum()), 1e-12)
+        return np.stack([mean, colour.min(axis=0), colour.max(axis=0),
+                         np.full(len(mean), UNLIKE / variance)]).astype(np.float32)
 
     @cached_property
     def variance(self) -> float:
@@ -123,9 +136,17 @@ class Painter:
 
     @cached_property
     def room(self) -> np.ndarray:
-        """Pixels from each pixel to where the sample ends or is transparent: (H, W) float32."""
-        opaque = np.ones(self.sample.shape, bool) if self.sample.opaque is None else self.sample.opaque
-        return ndimage.distance_transform_edt(np.pad(opaque, 1))[1:-1, 1:-1].astype(np.float32) - np.float32(1)
+        """Pixels from each pixel to a transparent one, or NEED / EDGE times those to the edge: (H, W) float32."""
+        height, width = self.sample.shape
+        y, x = np.mgrid[:height, :width]
+        room = np.minimum(np.minimum(x, width - 1 - x), np.minimum(y, height - 1 - y)) * (NEED / EDGE)
+        if self.sample.opaque is not None:
+            room = np.minimum(room, ndimage.distance_transform_edt(self.sample.opaque) - 1)
+        return room.astype(np.float32)
+
+    def mirrored(self, margin: int) -> np.ndarray:
+        """The luminance with `margin` pixels on each side, mirrored as `draw` mirrors it."""
+        return np.pad(self.sample.luminance, margin, mode="reflect")
 
     @cached_property
     def places(self) -> Places:
@@ -156,7 +177,7 @@ class Painter:
         each = count[:, 0] * count[:, 1]
         patch = np.repeat(np.arange(len(each)), each)
         index = np.arange(len(patch)) - np.repeat(np.cumsum(each) - each, each)
-        tile = low[patch] + np.stack([index % np.maximum(count[patch, 0], 1), index // np.maximum(count[patch, 0], 1)], -1)
+        tile = low[patch] + np.stack(np.divmod(index, count[patch, 0])[::-1], axis=-1)
         corner = (tile - 1) * TILE
         away = np.maximum(np.maximum(corner - centre[patch], centre[patch] - (corner + TILE - 1)), 0)
         near = (away * away).sum(axis=1) <= extent[patch] ** 2
@@ -235,8 +256,8 @@ class Painter:
         """The picture's luminance at the places of each query: device (Q, places, 2); see `rectify_reference`."""
         places = self.places
         out = opencl.zeros((len(query.who), places.padded, 2))
-        self._program(open_).rectify((places.padded // 16, len(query.who)), (1, 1), *_uploaded(query), *places.on_device,
-                                     *_uploaded(lists), opencl.to_device(rank), np.int32(below), *_uploaded(table),
+        self._program(open_).rectify((places.padded // 16, len(query.who)), (1, 1), *_uploaded(query),
+                                     *places.on_device, *_uploaded(lists), opencl.to_device(rank), np.int32(below), *_uploaded(table),
                                      *self._luminance_on_device, self.turn, self.last, *self._mask(open_), out)
         return out
 
@@ -249,7 +270,7 @@ class Painter:
         columns = -(-width // 32) * 32
         stride = columns + 2 * margin
         padded = np.zeros((height + 2 * margin, stride), np.float32)
-        padded[margin:margin + height, margin:margin + width] = self.sample.luminance
+        padded[:, :width + 2 * margin] = self.mirrored(margin)
         room = np.full((height, stride), -1, np.float32)
         room[:, :width] = self.room
         offsets = np.zeros(self.places.padded, np.int32)
@@ -274,7 +295,7 @@ class Painter:
         return np.stack([found[np.arange(count), row, 1].astype(np.int64), row], axis=-1)
 
     def directions(self, v: Any, points: np.ndarray) -> np.ndarray:
-        """Axis and change of angle along and across: (M, 4) float32; `directions_reference` says how. v on the device."""
+        """Axis, change of angle along and across: (M, 4) float32; see `directions_reference`. v is on the device."""
         out = opencl.empty((len(points), 4))
         if len(points):
             self._program(None).directions((-(-len(points) // TOGETHER) * TOGETHER,), (TOGETHER,), v,
@@ -463,23 +484,29 @@ def draw_reference(painter: Painter, table: Table, blend: float, open_: np.ndarr
     1. How remote each patch is, and the least.
     2. Sums of weights, of their squares, and of weighted colours less the sample's mean.
     3. The mean plus the mean weighted difference, times a gain: blend = 0: 1; blend = 1: 1 / √Σw², Σw = 1, which
-       keeps the variance of uncorrelated colours.
+       keeps the variance of uncorrelated colours; nearer to 1 where the patches are alike.
     4. Within the sample's own range; zero where masked.
     """
     pixels = _on_pixels(painter, table, open_, BIAS)
     nearest = np.min([q.e for q in pixels], axis=0, initial=NEVER)
     total = np.zeros(painter.shape, np.float32)
-    squares, colour = total.copy(), np.zeros((*painter.shape, painter.colour.shape[2]), np.float32)
-    mean, low, high = painter.tones
+    squares, power, colour = total.copy(), total.copy(), np.zeros((*painter.shape, painter.colour.shape[2]), np.float32)
+    mean, low, high, scale = painter.tones
     for (e, s, m), p in zip(pixels, table.values, strict=True):
         w = np.where(e < NEVER, _weight(e - nearest), np.float32(0))
         total, squares = total + w, squares + w * w
-        colour = colour + w[..., None] * (_read(painter.colour, *_place(painter, s, m, p)) - mean)
+        beyond = _read(painter.colour, *_place(painter, s, m, p)) - mean
+        colour = colour + w[..., None] * beyond
+        for c in range(len(mean)):
+            power = power + w * (beyond[..., c] * beyond[..., c])
     covered = total > 0
     total, squares = np.where(covered, total, np.float32(1)), np.where(covered, squares, np.float32(1))
-    share = np.float32(blend)
-    gain = (np.float32(1) - share) + share * (total / np.sqrt(squares))
-    picture = np.clip(mean + gain[..., None] * (colour / total[..., None]), low, high)
+    colour, unlike, one = colour / total[..., None], power / total, np.float32(1)
+    for c in range(len(mean)):
+        unlike = unlike - colour[..., c] * colour[..., c]
+    unlike = np.clip(unlike * scale[0] / np.maximum(one - squares / (total * total), np.float32(1e-6)), 0, 1)
+    gain = one + np.float32(blend) * unlike * (total / np.sqrt(squares) - one)
+    picture = np.clip(mean + gain[..., None] * colour, low, high)
     picture = np.where((covered if open_ is None else covered & open_)[..., None], picture, np.float32(0))
     return picture if picture.shape[2] == 3 else np.repeat(picture, 3, axis=2)
 
@@ -595,10 +622,13 @@ def match_reference(painter: Painter, wanted: np.ndarray, query: Query, radius: 
                     dear: np.ndarray) -> np.ndarray:
     """Specification of `match`: for each query the anchor (x, y) of least (E + LEAST_ERROR · variance) · (1 + dear).
 
-    E is the mean squared difference over the places that are there; anchors whose room is less than the patch needs
-    are left out; of equals the lowest row, then the leftmost. wanted (Q, places, 2) as `rectify` gives it; dear (H, W).
+    E is the mean squared difference over the places that are there, the sample mirrored at its edges. Anchors whose room
+    is less than the patch needs are left out; of equals the lowest row, then the leftmost. wanted (Q, places, 2) as
+    `rectify` gives it; dear (H, W), more than -1.
     """
     height, width = painter.sample.shape
+    margin = int(np.abs(painter.places.offsets).max(initial=0))
+    mirrored = painter.mirrored(margin)
     found = np.zeros((len(query.who), 2), np.int64)
     for k, (first, end) in enumerate(zip(query.first, query.end, strict=True)):
         error = np.zeros((height, width), np.float32)
@@ -606,12 +636,11 @@ def match_reference(painter: Painter, wanted: np.ndarray, query: Query, radius: 
         for i in range(first, end):
             value, there = wanted[k, i]
             if there:
-                x, y = painter.places.offsets[i]
-                shifted = np.zeros((height, width), np.float32)
-                inside = np.s_[max(-y, 0):height - max(y, 0), max(-x, 0):width - max(x, 0)]
-                shifted[inside] = painter.sample.luminance[max(y, 0):height + min(y, 0), max(x, 0):width + min(x, 0)]
+                x, y = painter.places.offsets[i] + margin
+                shifted = mirrored[y:y + height, x:x + width]
                 error, count = error + (shifted - value) * (shifted - value), count + np.float32(1)
-        error = (error / max(count, np.float32(1)) + np.float32(LEAST_ERROR * painter.variance)) * (np.float32(1) + dear)
+        least = np.float32(LEAST_ERROR * painter.variance)
+        error = (error / max(count, np.float32(1)) + least) * (np.float32(1) + dear)
         error = np.where(painter.room >= painter.needs(radius)[k], error, NEVER)
         found[k] = np.divmod(int(error.argmin()), width)[::-1]
     return found

