@@ -119,7 +119,7 @@ class Settings:
             raise ValueError(f"patches grow for at least 1 frame, not {self.growth}")
         if self.usage < 0 or self.sharpness <= 0 or self.head_start < 0 or self.torn < 0 or self.repairs < 0:
             raise ValueError("usage, head_start, torn and repairs are not negative, sharpness is positive")
-        if self.blend != "auto" and (isinstance(self.blend, str) or not 0 <= self.blend <= 1):
+        if self.blend != "auto" and (not isinstance(self.blend, int | float) or not 0 <= self.blend <= 1):
             raise ValueError(f'blend is "auto" or in 0..1, not {self.blend!r}')
         if not 0 <= self.repair <= 1:
             raise ValueError(f"repair is a share of the patches, not {self.repair}")

@@ -9,7 +9,8 @@ it shows the sample at a + Rot(θ_s) (U, V), where
 so that V = 0 is the streamline through its centre, to second order. Each pixel belongs to the patch that is least
 remote,
 
-    e = steepness (ρ + head_start (1 - w)) + t⁴ / (1 - t)    ρ = (s² / elongation + m² elongation) / r²    t = ρ / reach²
+    e = steepness (ρ + head_start (1 - w)) + t⁴ / (1 - t)
+    ρ = (s² / elongation + m² elongation) / r²        t = ρ / reach²
 
 which is a power diagram where t is small; beyond t = 1 a patch shows nothing. Others have a share where they are less
 than 4 more remote, by (1 - Δe / 4)⁴, which is near exp(-Δe).
@@ -42,8 +43,8 @@ NEVER = np.float32(1e30)
 NEED = 1.25
 """Radii round an anchor in which no pixel of the sample may be transparent."""
 EDGE = 0.6
-"""Radii from an anchor to the sample's edge, at least. Farther out a patch may show the sample mirrored; were more asked
-for, the sample's middle would be seen more often than its edges."""
+"""Radii from an anchor to the sample's edge, at least. Farther out a patch may show the sample mirrored; were more
+asked for, the sample's middle would be seen more often than its edges."""
 MATCHED = 1.15
 """Radius of the disc in which a newborn patch is compared with the picture, over the patch's radius."""
 SPREAD = 12
@@ -257,7 +258,8 @@ class Painter:
         places = self.places
         out = opencl.zeros((len(query.who), places.padded, 2))
         self._program(open_).rectify((places.padded // 16, len(query.who)), (1, 1), *_uploaded(query),
-                                     *places.on_device, *_uploaded(lists), opencl.to_device(rank), np.int32(below), *_uploaded(table),
+                                     *places.on_device, *_uploaded(lists), opencl.to_device(rank), np.int32(below),
+                                     *_uploaded(table),
                                      *self._luminance_on_device, self.turn, self.last, *self._mask(open_), out)
         return out
 
@@ -622,16 +624,16 @@ def match_reference(painter: Painter, wanted: np.ndarray, query: Query, radius: 
                     dear: np.ndarray) -> np.ndarray:
     """Specification of `match`: for each query the anchor (x, y) of least (E + LEAST_ERROR · variance) · (1 + dear).
 
-    E is the mean squared difference over the places that are there, the sample mirrored at its edges. Anchors whose room
-    is less than the patch needs are left out; of equals the lowest row, then the leftmost. wanted (Q, places, 2) as
-    `rectify` gives it; dear (H, W), more than -1.
+    E is the mean squared difference over the places that are there, the sample mirrored at its edges. Anchors whose
+    room is less than the patch needs are left out; of equals the lowest row, then the leftmost. wanted (Q, places, 2)
+    as `rectify` gives it; dear (H, W), more than -1.
     """
     height, width = painter.sample.shape
     margin = int(np.abs(painter.places.offsets).max(initial=0))
     mirrored = painter.mirrored(margin)
     found = np.zeros((len(query.who), 2), np.int64)
     for k, (first, end) in enumerate(zip(query.first, query.end, strict=True)):
-        error = np.zeros((height, width), np.float32)
+        error: np.ndarray = np.zeros((height, width), np.float32)
         count = np.float32(0)
         for i in range(first, end):
             value, there = wanted[k, i]
