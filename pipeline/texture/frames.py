@@ -6,12 +6,14 @@ All are pictures in linear light, top row first; synth.texture has the lowest ro
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipeline.build.artifact import Artifact, Inputs
 from pipeline.files import images
+from pipeline.files.format import Format
 from pipeline.flow import solid_input, upsampled, walls
 from pipeline.texture.tables import TextureScene
 
@@ -50,6 +52,29 @@ def make_by_carry(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Ite
 
     yield from ((frame, synthesis.picture(state)[::-1]) for frame, synthesis, state in _states(
         scene, inputs, frames, carry, scene.carry.settings()))
+
+
+def make_maps(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The UV maps: (h, w, 6), u, v and weight of the strongest patch of each pixel, then of the next."""
+    from synth.texture import carry
+
+    yield from ((frame, synthesis.maps(state)[::-1]) for frame, synthesis, state in _states(
+        scene, inputs, frames, carry, scene.carry.settings()))
+
+
+def write_maps(file: Path, maps: np.ndarray) -> None:
+    """Write UV maps as an EXR of CHANNELS."""
+    images.write(file, {name: maps[..., n] for n, name in enumerate(CHANNELS)})
+
+
+def read_maps(file: Path) -> np.ndarray:
+    """The maps that `write_maps` wrote."""
+    found = images.read(file)
+    return np.stack([found[name] for name in CHANNELS], axis=-1)
+
+
+CHANNELS = ("first.u", "first.v", "first.weight", "second.u", "second.v", "second.weight")
+MAPS = Format("exr", write_maps, read_maps)
 
 
 def make_by_pixels(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
@@ -114,6 +139,8 @@ def frame_artifacts(scene: TextureScene) -> tuple[Artifact, ...]:
     make, keys = {"carry": (make_by_carry, "carry"), "paper": (make_by_paper, "paper"),
                   "pixels": (make_by_pixels, "paper")}[scene.texture.method]
     made = [Artifact("frames", "synth", images.LIGHT, (*READS, keys), needs, make)]
+    if scene.texture.maps:
+        made.append(Artifact("uv", "synth", MAPS, (*READS, "carry"), needs, make_maps, export=True))
     if "holes" in scene.figure.panels:
         made.append(Artifact("holes", "synth", images.LIGHT, (*READS, "paper"), needs, make_holes))
     if scene.figure.zoom:

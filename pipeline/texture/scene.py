@@ -37,6 +37,8 @@ def texture_fits(scene: Scene) -> Faults:
         yield "carry.radius", "has its least after its largest"
     if scene.paper.smallest > scene.paper.largest:
         yield "paper.smallest", f"is above paper.largest, {scene.paper.largest}"
+    if texture.maps and texture.method != "carry":
+        yield "texture.maps", f'are of patches: there are none with method = "{texture.method}"'
     if "holes" in scene.figure.panels and texture.method != "paper":
         yield "figure.panels", f'there are no "holes" with texture.method = "{texture.method}"'
     for number, moment in enumerate(scene.figure.moments):

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tiny
+from scipy import ndimage
 from tiny import BY_PAPER, TEXTURE, Memory, changed, scene
 
 from pipeline.build.graph import computed
@@ -80,3 +81,32 @@ def test_holes_are_black_in_the_frames_of_the_paper(tmp_path: Path) -> None:
     black = (holes == 0).all(axis=-1)
     assert 0 < black.mean() < 1
     np.testing.assert_array_equal(holes[~black], frame[~black])
+
+
+def test_a_frame_is_drawn_from_its_maps_alone(tmp_path: Path) -> None:
+    """What Blender, Unity or Houdini does with them: sample the picture at u, v, and mix by the weights."""
+    text = changed(TEXTURE, "size = [64, 48]", "size = [64, 48]\nmaps = true") + "[carry]\nblend = 0.0\n"
+    graph = tiny.made(tmp_path, text, "synth")
+    sample = graph.read("", "sample", 0)[::-1]
+    for frame in (1, 3):
+        maps, expected = graph.read("", "uv", frame), graph.read("", "frames", frame)
+        assert maps.shape == (48, 64, 6)
+        weights = maps[..., [2, 5]]
+        assert (weights >= 0).all() and (weights.sum(axis=-1) <= 1 + 1e-5).all()
+        drawn = sum(maps[..., [n + 2]] * looked_up(sample, maps[..., n:n + 2]) for n in (0, 3)) / weights.sum(
+            axis=-1, keepdims=True)
+        sure = weights.sum(axis=-1) > 0.97
+        assert sure.mean() > 0.5
+        assert np.abs(drawn - expected)[sure].mean() < 0.1 * expected.std()
+
+
+def looked_up(sample: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """The sample (H, W, 3), row 0 the lowest, at places (Y, X, 2) from 0 at its left and lower edge to 1."""
+    at = [uv[..., 1] * sample.shape[0] - 0.5, uv[..., 0] * sample.shape[1] - 0.5]
+    return np.stack([ndimage.map_coordinates(sample[..., c], at, order=3, mode="nearest") for c in range(3)], axis=-1)
+
+
+def test_maps_are_of_patches(tmp_path: Path) -> None:
+    text = changed(BY_PAPER, "size = [64, 48]", "size = [64, 48]\nmaps = true")
+    assert tiny.complaint(tiny.written(tmp_path, text)) == (
+        'texture.maps: are of patches: there are none with method = "paper"')
