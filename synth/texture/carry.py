@@ -195,13 +195,14 @@ class Ground:
         """Whether texture is at the pixels nearest to points (M, 2): (M,) bool."""
         return np.ones(len(points), bool) if self.open is None else self.open[_nearest(self.open, points)]
 
-    def near(self, points: np.ndarray, distance: np.ndarray) -> np.ndarray:
-        """Whether a pixel without texture may be within `distance` (M,) of points (M, 2): (M,) bool."""
+    def free(self, points: np.ndarray) -> np.ndarray:
+        """How far round points (M, 2) there is texture only: (M,) float64, pixels, at least 0."""
         if self.clear is None:
-            return np.zeros(len(points), bool)
+            return np.full(len(points), np.inf)
         rows, columns = _nearest(self.clear, points)
         away = np.hypot(points[:, 0] - columns, points[:, 1] - rows)
-        return self.clear[rows, columns] - away < distance + 2
+        # 2: the pixels a line passes lie up to one beside it
+        return np.maximum(self.clear[rows, columns] - away - 2, 0)
 
 
 class Synthesis:
@@ -288,23 +289,23 @@ class Synthesis:
         if open_ is not None:
             moving &= open_
         if moving.all():
-            facing = v
+            return Ground(v, opencl.to_device(v), None, None)
+        v = np.where(moving[..., None], v, np.float32(0))
+        walls = None if open_ is None else self.painter.walls(open_)
+        if walls is not None and (moving == open_).all():
+            facing = v[walls.nearest]
         else:
-            v = np.where(moving[..., None], v, np.float32(0))
+            facing = self._continued(v)
+        return Ground(v, opencl.to_device(facing), open_, None if walls is None else walls.clear)
+
+    def _continued(self, v: np.ndarray) -> np.ndarray:
+        """Unit vectors along v, continued where it rests: (Y, X, 2) float32. Those of the last flow are kept."""
+        if self._last_flow is None or not np.array_equal(self._last_flow[0], v):
             angle = flow.angles(v)
-            facing = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        return Ground(v, opencl.to_device(facing.astype(np.float32)), open_,
-                      None if open_ is None else self._clear(open_.tobytes()))
+            self._last_flow = v, np.stack([np.cos(angle), np.sin(angle)], axis=-1).astype(np.float32)
+        return self._last_flow[1]
 
-    def _clear(self, open_: bytes) -> np.ndarray:
-        """Pixels from each pixel to the nearest that is masked; that of the last mask is kept."""
-        if self._last_clear is None or self._last_clear[0] != open_:
-            mask = np.frombuffer(open_, bool).reshape(self.shape)
-            # beyond the picture its border's pixels go on
-            self._last_clear = open_, ndimage.distance_transform_edt(mask).astype(np.float32)
-        return self._last_clear[1]
-
-    _last_clear: tuple[bytes, np.ndarray] | None = None
+    _last_flow: tuple[np.ndarray, np.ndarray] | None = None
 
     def _turned(self, centre: np.ndarray, ground: Ground) -> dict[str, np.ndarray]:
         """Axis, bend and radius of patches at centres (M, 2)."""
@@ -331,9 +332,11 @@ class Synthesis:
         values[(now.age == 0) & (now.weight == 0), BEFORE] = NEVER
         values[:, RADIUS] = now.radius
         if ground is None and now.mask.size:
-            ground = Ground(np.zeros(0), None, now.mask, self._clear(now.mask.tobytes()))
+            ground = Ground(np.zeros(0), None, now.mask, self.painter.walls(now.mask).clear)
+        values[:, NEAR] = NEVER
         if ground is not None:
-            values[:, NEAR] = ground.near(now.centre, self.painter.extent(now.radius))
+            free = ground.free(now.centre)
+            values[:, NEAR] = np.where(free < self.painter.extent(now.radius), free * free, NEVER)
         return Table(cells.astype(np.int32), values)
 
     def _tables(self, state: State) -> tuple[Table, Lists]:
@@ -405,7 +408,9 @@ class Synthesis:
         least = self.settings.death * (now.radius[older] + now.radius[younger]) / 2
         near = s * s / e + m * m * e < least * least
         if ground.open is not None:
-            near &= sees_reference(ground.open, now.centre[younger], now.centre[older])
+            by_wall = np.flatnonzero(near)
+            by_wall = by_wall[ground.free(now.centre[older[by_wall]]) < np.hypot(*offset[by_wall].T)]
+            near[by_wall] = sees_reference(ground.open, now.centre[younger[by_wall]], now.centre[older[by_wall]])
         for a, b in zip(older[near].tolist(), younger[near].tolist(), strict=True):
             fading[b] |= not fading[a]
         return replace(now, fading=fading)
@@ -519,10 +524,10 @@ class Synthesis:
         s, m = offset[..., 0] * cos + offset[..., 1] * sin, offset[..., 1] * cos - offset[..., 0] * sin
         limit = distance * np.minimum(radii[part], own)
         near = s * s / e + m * m * e <= limit * limit
-        if ground.open is not None and ground.near(centre[None], np.array([limit.max() * np.sqrt(e)]))[0]:
-            seen = sees_reference(ground.open, place[part].reshape(-1, 2).astype(np.float64),
-                                  np.broadcast_to(centre, (near.size, 2)))
-            near &= seen.reshape(near.shape)
+        if ground.open is not None:
+            asked = near & (np.hypot(offset[..., 0], offset[..., 1]) > ground.free(centre[None]))
+            near[asked] = sees_reference(ground.open, place[part][asked].astype(np.float64),
+                                         np.broadcast_to(centre, (asked.sum(), 2)))
         bare[part] &= ~near
 
     def _uncovered(self, now: State, open_: np.ndarray, ground: Ground) -> State:

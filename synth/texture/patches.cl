@@ -16,7 +16,7 @@
 #define LANES (float16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 
 // A patch's table: fraction of its centre beyond its cell, axis t, bends, anchor in the sample, 1 / r^2, steepness,
-// what growth has still to add, the same a frame earlier, radius, whether a masked pixel is near.
+// what growth has still to add, the same a frame earlier, radius, square of the distance up to which nothing hides it.
 enum { FX, FY, TX, TY, BEND_T, BEND_N, AX, AY, INVERSE, STEEP, BIAS, BEFORE, RADIUS, NEAR };
 
 inline int16 whole16(float16 v) {
@@ -31,19 +31,24 @@ inline int whole(float v) {
 }
 
 #if MASKED
-#define OPEN(i, j) open[clamp(j, 0, size.y - 1) * size.x + clamp(i, 0, size.x - 1)]
+#define CLEAR(i, j) clear[clamp(j, 0, size.y - 1) * size.x + clamp(i, 0, size.x - 1)]
+#define OPEN(i, j) (CLEAR(i, j) > 0.0f)
 
 // Whether no masked pixel lies between place (x + gx, y + gy) and that plus (dx, dy): half-pixel steps; a step over a
-// corner needs both pixels beside it. Beyond the picture its border's pixels go on.
-inline bool sees(global const uchar *restrict open, int2 size, int x, int y, float gx, float gy, float dx, float dy) {
+// corner needs both pixels beside it. Beyond the picture its border's pixels go on. `clear` is how far each pixel is
+// from the nearest masked one: steps that stay nearer than that are not looked at, which changes nothing.
+inline bool sees(global const float *restrict clear, int2 size, int x, int y, float gx, float gy, float dx, float dy) {
     const int steps = 2 * ((int)fmax(fabs(dx), fabs(dy)) + 1);
     int px = x + whole(gx + 0.5f), py = y + whole(gy + 0.5f);
     if (!OPEN(px, py)) return false;
     for (int k = 1; k <= steps; k++) {
+        // a step is at most 0.71 pixels long; 3 for what rounding adds, and the corners
+        const int free = min((int)(1.4f * (CLEAR(px, py) - 3.0f)), steps - k);
+        k += max(free, 0);
         const float f = (float)k / (float)steps;
         const int i = x + whole(gx + dx * f + 0.5f), j = y + whole(gy + dy * f + 0.5f);
         if (!OPEN(i, j)) return false;
-        if (i != px && j != py && !(OPEN(px, j) && OPEN(i, py))) return false;
+        if (free <= 0 && i != px && j != py && !(OPEN(px, j) && OPEN(i, py))) return false;
         px = i;
         py = j;
     }
@@ -51,7 +56,7 @@ inline bool sees(global const uchar *restrict open, int2 size, int x, int y, flo
 }
 
 // Of the lanes where `asked`, those that see the patch's centre from (x + gx, y + gy); (dx, dy) leads from the centre.
-inline int16 seen(global const uchar *restrict open, int2 size, int16 asked, int16 x, int16 y, float16 gx, float16 gy,
+inline int16 seen(global const float *restrict clear, int2 size, int16 asked, int16 x, int16 y, float16 gx, float16 gy,
                   float16 dx, float16 dy) {
     int ask[16], xs[16], ys[16];
     float gxs[16], gys[16], dxs[16], dys[16];
@@ -63,7 +68,7 @@ inline int16 seen(global const uchar *restrict open, int2 size, int16 asked, int
     vstore16(dx, 0, dxs);
     vstore16(dy, 0, dys);
     for (int l = 0; l < 16; l++)
-        if (ask[l]) ask[l] = sees(open, size, xs[l], ys[l], gxs[l], gys[l], -dxs[l], -dys[l]) ? -1 : 0;
+        if (ask[l]) ask[l] = sees(clear, size, xs[l], ys[l], gxs[l], gys[l], -dxs[l], -dys[l]) ? -1 : 0;
     return vload16(0, ask);
 }
 #endif
@@ -144,10 +149,10 @@ READ(CHANNELS)
 #if MASKED
 // `e` where the patch is not seen is NEVER; only lanes are asked where it would count.
 #define HIDE(e, counts)                                                                                           \
-    if (p[NEAR] != 0.0f) {                                                                                        \
-        const int16 asked = (e < NEVER) & (counts);                                                               \
+    if (p[NEAR] < NEVER) {                                                                                        \
+        const int16 asked = (e < NEVER) & (dx * dx + dy * dy > p[NEAR]) & (counts);                               \
         if (any(asked))                                                                                           \
-            e = select(e, (float16)(NEVER), asked & ~seen(open, size, asked, x + convert_int16(LANES), (int16)(y), \
+            e = select(e, (float16)(NEVER), asked & ~seen(clear, size, asked, x + convert_int16(LANES), (int16)(y), \
                        (float16)(0.0f), (float16)(0.0f), dx, (float16)(dy)));                                     \
     }
 #else
@@ -158,11 +163,11 @@ READ(CHANNELS)
 // 1 / sqrt(sum of w^2) as far as the patches differ, within [low, high]; zero where masked. tones: mean, low, high of
 // each channel, and UNLIKE over the sample's variance. Equal to the reference bit for bit.
 // starts (tiles + 1), members: the patches that reach each tile, in order; cells (P, 2): the pixel before each centre;
-// patches (P, FIELDS); sample (rows, columns, CHANNELS), enlarged; open (Y, X): where texture is
+// patches (P, FIELDS); sample (rows, columns, CHANNELS), enlarged; clear (Y, X): pixels to the nearest masked one
 kernel void draw(global const int *restrict starts, global const int *restrict members,
                  global const int2 *restrict cells, global const float *restrict patches,
                  global const float *restrict sample, const int2 enlarged, const float2 turn, const float2 last,
-                 global const float *restrict tones, const float blend, global const uchar *restrict open,
+                 global const float *restrict tones, const float blend, global const float *restrict clear,
                  const int2 size, global float *restrict picture) {
     TILED;
     float16 nearest = (float16)(FARTHEST);
@@ -210,7 +215,7 @@ kernel void draw(global const int *restrict starts, global const int *restrict m
                  out[c]);
     for (int l = 0; l < min(TILE, size.x - x); l++) {
 #if MASKED
-        const bool show = shown[l] && open[y * size.x + x + l];
+        const bool show = shown[l] && clear[y * size.x + x + l] > 0.0f;
 #else
         const bool show = shown[l];
 #endif
@@ -222,7 +227,7 @@ kernel void draw(global const int *restrict starts, global const int *restrict m
 // all patches of a pixel together 1. Equal to the reference bit for bit.
 kernel void strongest(global const int *restrict starts, global const int *restrict members,
                       global const int2 *restrict cells, global const float *restrict patches, const float2 turn,
-                      const float2 last, global const uchar *restrict open, const int2 size,
+                      const float2 last, global const float *restrict clear, const int2 size,
                       global float *restrict maps) {
     TILED;
     float16 nearest = (float16)(FARTHEST);
@@ -261,7 +266,7 @@ kernel void strongest(global const int *restrict starts, global const int *restr
     for (int l = 0; l < min(TILE, size.x - x); l++)
         for (int c = 0; c < 6; c++) {
 #if MASKED
-            const bool show = open[y * size.x + x + l];
+            const bool show = clear[y * size.x + x + l] > 0.0f;
 #else
             const bool show = true;
 #endif
@@ -272,7 +277,7 @@ kernel void strongest(global const int *restrict starts, global const int *restr
 // The nearest patch of each pixel (Y, X) int32, the first of equals; -1 where none reaches. `when`: BIAS or BEFORE.
 kernel void owners(global const int *restrict starts, global const int *restrict members,
                    global const int2 *restrict cells, global const float *restrict patches, const int when,
-                   global const uchar *restrict open, const int2 size, global int *restrict owner) {
+                   global const float *restrict clear, const int2 size, global int *restrict owner) {
     TILED;
     float16 nearest = (float16)(FARTHEST);
     int16 who = (int16)(-1);
@@ -294,7 +299,7 @@ kernel void owners(global const int *restrict starts, global const int *restrict
 kernel void bare(global const int *restrict starts, global const int *restrict members,
                  global const int2 *restrict cells, global const float *restrict patches,
                  global const uchar *restrict living, global const float *restrict radii, const float distance,
-                 const int columns, global const uchar *restrict open, const int2 size, global uchar *restrict out) {
+                 const int columns, global const float *restrict clear, const int2 size, global uchar *restrict out) {
     const int tile = get_global_id(0), x = (tile % columns - 1) * TILE, y = (tile / columns - 1) * TILE;
     const int16 along = (int16)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3) * (TILE / 4);
     const int16 up = (int16)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3) * (TILE / 4);
@@ -310,8 +315,9 @@ kernel void bare(global const int *restrict starts, global const int *restrict m
         int16 near = s * s * ALONG + m * m * ACROSS <= limit * limit;
 #if MASKED
         near &= missing;
-        if (p[NEAR] != 0.0f && any(near))
-            near &= seen(open, size, near, x + along, y + up, (float16)(0.0f), (float16)(0.0f), dx, dy);
+        const int16 asked = near & (dx * dx + dy * dy > p[NEAR]);
+        if (any(asked))
+            near &= ~asked | seen(clear, size, asked, x + along, y + up, (float16)(0.0f), (float16)(0.0f), dx, dy);
 #endif
         missing &= ~near;
     }
@@ -327,7 +333,7 @@ kernel void rectify(global const int *restrict who, global const int *restrict w
                     global const int *restrict starts, global const int *restrict members,
                     global const int *restrict rank, const int round, global const int2 *restrict cells,
                     global const float *restrict patches, global const float *restrict sample, const int2 enlarged,
-                    const float2 turn, const float2 last, global const uchar *restrict open, const int2 size,
+                    const float2 turn, const float2 last, global const float *restrict clear, const int2 size,
                     global float *restrict out) {
     const int block = get_global_id(0), q = get_global_id(1), blocks = get_global_size(0);
     if (block * 16 >= to[q] || block * 16 + 15 < from[q]) return;
@@ -343,7 +349,7 @@ kernel void rectify(global const int *restrict who, global const int *restrict w
     const float16 x = a * own[TX] - b * own[TY], y = a * own[TY] + b * own[TX];
     int16 visible = (int16)(-1);
 #if MASKED
-    visible = seen(open, size, visible, (int16)(home.x), (int16)(home.y), own[FX] + x, own[FY] + y, x, y);
+    visible = seen(clear, size, visible, (int16)(home.x), (int16)(home.y), own[FX] + x, own[FY] + y, x, y);
     if (!any(visible)) visible = (int16)(0);
 #endif
 #define FROM_THIS                                                                                                 \
@@ -356,10 +362,10 @@ kernel void rectify(global const int *restrict who, global const int *restrict w
     float16 e = remoteness(s, m, p, p[BIAS])
 #if MASKED
 #define HIDE_PLACES(counts)                                                                                       \
-    if (p[NEAR] != 0.0f) {                                                                                        \
-        const int16 asked = (e < NEVER) & visible & (counts);                                                     \
+    if (p[NEAR] < NEVER) {                                                                                        \
+        const int16 asked = (e < NEVER) & visible & (dx * dx + dy * dy > p[NEAR]) & (counts);                     \
         if (any(asked))                                                                                           \
-            e = select(e, (float16)(NEVER), asked & ~seen(open, size, asked, (int16)(home.x), (int16)(home.y),    \
+            e = select(e, (float16)(NEVER), asked & ~seen(clear, size, asked, (int16)(home.x), (int16)(home.y),   \
                        own[FX] + x, own[FY] + y, dx, dy));                                                        \
     }
 #else
@@ -419,7 +425,8 @@ kernel void match(global const float *restrict wanted, global const int *restric
         for (int i = from[q]; i < to[q]; i++) {
             global const float *restrict pair = wanted + (q * places + i) * 2;
             if (pair[1] == 0.0f) continue;
-            const float16 d = vload16(0, here + offsets[i]) - pair[0], d_too = vload16(0, here + offsets[i] + 16) - pair[0];
+            const float16 d = vload16(0, here + offsets[i]) - pair[0];
+            const float16 d_too = vload16(0, here + offsets[i] + 16) - pair[0];
             sum += d * d;
             sum_too += d_too * d_too;
             count += 1.0f;

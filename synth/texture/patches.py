@@ -21,7 +21,7 @@ patch that has a share in one of 16 pixels.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -93,6 +93,7 @@ class Painter:
     reach: float
     elongation: float
     largest: float
+    _walls: list[Walls] = field(default_factory=list, init=False, repr=False)
 
     # what the sample is to the kernels
 
@@ -210,9 +211,15 @@ class Painter:
     def _luminance_on_device(self) -> tuple[Any, np.ndarray]:
         return opencl.to_device(self.luminance), np.array(self.luminance.shape[1::-1], np.int32)
 
+    def walls(self, open_: np.ndarray) -> Walls:
+        """What is known of a mask (Y, X) bool, False where no texture is; that of the last mask is kept."""
+        if not self._walls or not np.array_equal(self._walls[0].open, open_):
+            self._walls[:] = [Walls.of(open_)]
+        return self._walls[0]
+
     def _mask(self, open_: np.ndarray | None) -> tuple[Any, np.ndarray]:
-        values = np.zeros(1, np.uint8) if open_ is None else open_.view(np.uint8)
-        return opencl.to_device(values), np.array(self.shape[::-1], np.int32)
+        clear = opencl.zeros(1) if open_ is None else self.walls(open_).on_device
+        return clear, np.array(self.shape[::-1], np.int32)
 
     def _over_pixels(self) -> tuple[tuple[int, int], tuple[int, int]]:
         rows, columns = self.tiles
@@ -305,6 +312,29 @@ class Painter:
                                            opencl.to_device(points.astype(np.float32)), np.int32(len(points)),
                                            np.float32(STEP), out)
         return out.get()
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """A mask, and what follows from it.
+
+    open     (Y, X) bool: where texture is
+    clear    (Y, X) float32: pixels to the nearest that is masked
+    nearest  row and column, (Y, X) each, of the nearest that is not masked
+    """
+
+    open: np.ndarray
+    clear: np.ndarray
+    nearest: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of(cls, open_: np.ndarray) -> Walls:
+        nearest = ndimage.distance_transform_edt(~open_, return_distances=False, return_indices=True)
+        return cls(open_.copy(), ndimage.distance_transform_edt(open_).astype(np.float32), tuple(nearest))
+
+    @cached_property
+    def on_device(self) -> Any:
+        return opencl.to_device(self.clear)
 
 
 class Query(NamedTuple):
@@ -406,7 +436,8 @@ def sees_reference(open_: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.
     Beyond the picture its border's pixels go on.
     """
     def at(i: np.ndarray, j: np.ndarray) -> np.ndarray:
-        return open_[np.clip(j, 0, open_.shape[0] - 1), np.clip(i, 0, open_.shape[1] - 1)]
+        # much faster than np.clip for the few points of a newborn
+        return open_[np.minimum(np.maximum(j, 0), open_.shape[0] - 1), np.minimum(np.maximum(i, 0), open_.shape[1] - 1)]
 
     way = (end - start).astype(np.float32)
     cell = np.rint(start).astype(np.int64)
@@ -471,7 +502,7 @@ def _on_pixels(painter: Painter, table: Table, open_: np.ndarray | None, when: i
         dx, dy = (x - cx).astype(np.float32) - p[FX], (y - cy).astype(np.float32) - p[FY]
         s, m = dx * p[TX] + dy * p[TY], dy * p[TX] - dx * p[TY]
         e = _remoteness(painter, s, m, p, p[when])
-        if open_ is not None and p[NEAR]:
+        if open_ is not None and p[NEAR] < NEVER:
             start = np.stack([x, y], -1).reshape(-1, 2).astype(np.float64)
             way = np.stack([dx, dy], -1).reshape(-1, 2)
             clear = sees_reference(open_, start, start - way).reshape(painter.shape)
@@ -557,7 +588,7 @@ def bare_reference(painter: Painter, table: Table, living: np.ndarray, radii: np
         s, m = dx * p[TX] + dy * p[TY], dy * p[TX] - dx * p[TY]
         limit = np.minimum(radii, p[RADIUS]) * np.float32(distance)
         near = s * s * np.float32(1 / painter.elongation) + m * m * np.float32(painter.elongation) <= limit * limit
-        if open_ is not None and p[NEAR]:
+        if open_ is not None and p[NEAR] < NEVER:
             start = site.reshape(-1, 2).astype(np.float64)
             near &= sees_reference(open_, start, start - np.stack([dx, dy], -1).reshape(-1, 2)).reshape(near.shape)
         missing &= ~near
@@ -601,7 +632,7 @@ def rectify_reference(painter: Painter, table: Table, query: Query, rank: np.nda
             dy = y + (np.float32(home[1] - cy) + (own[FY] - p[FY]))
             s, m = dx * p[TX] + dy * p[TY], dy * p[TX] - dx * p[TY]
             e = _remoteness(painter, s, m, p, p[BIAS])
-            if open_ is not None and p[NEAR]:
+            if open_ is not None and p[NEAR] < NEVER:
                 e = np.where(visible & sees_from(open_, home, start, np.stack([dx, dy], -1)), e, NEVER)
             found.append((e, _read(painter.luminance, *_place(painter, s, m, p))[..., 0]))
         nearest = np.min([e for e, _ in found], axis=0, initial=NEVER)

@@ -50,7 +50,7 @@ def painter(grey=False, elongation=1.0, **sample):
     return Painter(noise(grey=grey, **sample), SHAPE, 1.7, elongation, 9.0)
 
 
-def table(count=24, seed=3, near=0.0):
+def table(count=24, seed=3, near=NEVER):
     """Patches of radii 4 to 9 on and round the picture, some still growing."""
     random = rng(seed)
     centre = random.uniform(-6, np.array(SHAPE[::-1]) + 6, (count, 2))
@@ -81,7 +81,7 @@ def wall():
 @KINDS
 @pytest.mark.parametrize("blend", [0.0, 0.3, 1.0])
 def test_draw_is_its_reference(grey, masked, elongation, blend):
-    p, t, open_ = painter(grey, elongation), table(near=float(masked)), wall() if masked else None
+    p, t, open_ = painter(grey, elongation), table(near=0 if masked else NEVER), wall() if masked else None
     drawn = p.draw(t, p.reaching(t), blend, open_)
     np.testing.assert_array_equal(drawn, draw_reference(p, t, blend, open_))
     assert drawn.std() > 0.05
@@ -89,14 +89,14 @@ def test_draw_is_its_reference(grey, masked, elongation, blend):
 
 @KINDS
 def test_strongest_is_its_reference(grey, masked, elongation):
-    p, t, open_ = painter(grey, elongation), table(near=float(masked)), wall() if masked else None
+    p, t, open_ = painter(grey, elongation), table(near=0 if masked else NEVER), wall() if masked else None
     np.testing.assert_array_equal(p.strongest(t, p.reaching(t), open_), strongest_reference(p, t, open_))
 
 
 @KINDS
 @pytest.mark.parametrize("when", [BIAS, BEFORE])
 def test_owners_is_its_reference(grey, masked, elongation, when):
-    p, t, open_ = painter(grey, elongation), table(8, near=float(masked)), wall() if masked else None
+    p, t, open_ = painter(grey, elongation), table(8, near=0 if masked else NEVER), wall() if masked else None
     owner = p.owners(t, p.reaching(t), open_, when)
     np.testing.assert_array_equal(owner, owners_reference(p, t, open_, when))
     assert (owner < 0).any()
@@ -104,7 +104,7 @@ def test_owners_is_its_reference(grey, masked, elongation, when):
 
 @KINDS
 def test_bare_is_its_reference(grey, masked, elongation):
-    p, t, open_ = painter(grey, elongation), table(near=float(masked)), wall() if masked else None
+    p, t, open_ = painter(grey, elongation), table(near=0 if masked else NEVER), wall() if masked else None
     living = rng(5).random(24) < 0.8
     radii = rng(6).uniform(4, 9, sites(p).shape[:2]).astype(np.float32)
     bare = p.bare(t, p.reaching(t), living, radii, 1.12, open_)
@@ -121,7 +121,7 @@ def query(p, t, who=(3, 7, 11, 20)):
 
 @KINDS
 def test_rectify_is_its_reference(grey, masked, elongation):
-    p, t, open_ = painter(grey, elongation), table(near=float(masked)), wall() if masked else None
+    p, t, open_ = painter(grey, elongation), table(near=0 if masked else NEVER), wall() if masked else None
     q, radius = query(p, t)
     rank = np.arange(24, dtype=np.int32) // 8
     seen = p.rectify(t, p.around(t, q.who, radius), q, rank, 2, open_).get()
