@@ -1,8 +1,9 @@
 """The flow that a scene lives in, shared by all methods: its coarse motion L and the solids in it.
 
 Tables [coarse] and [[obstacles]], each with what it does; the artifacts `L`, a velocity in world units per second, and
-`solid`, the signed distance to the walls of all obstacles in world units, negative inside. A new kind of coarse motion
-or of obstacle is one class here and its place in `Coarse` or `Obstacle`.
+`solid`, the signed distance to the walls of all obstacles in world units, negative inside, and negative too where the
+coarse motion is a file's that has no values there. A new kind of coarse motion or of obstacle is one class here and its
+place in `Coarse` or `Obstacle`.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from pydantic import Field, Strict
 from pipeline.build.artifact import Artifact, Inputs, Needs, Reads
 from pipeline.build.method import Faults
 from pipeline.errors import BadInput
-from pipeline.files import fields, meshes, pictures, volumes
+from pipeline.files import fields, meshes, netcdf, pictures, volumes
 from pipeline.tables import Asset, Grid, Radius, SceneTables, Table, grid, key, listed
 from synth.field import Field as MotionField
+from synth.field import domain_origin
 
 if TYPE_CHECKING:
     from synth import obstacle
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 OUTLINE = 1024  # rows of the mask that an SVG is filled into
 WIDEST = 16.0  # of it, in its heights
 VOXEL = 0.5  # of a mesh, in cells of H
+Longitude = Annotated[float, Field(ge=-360, le=720)]
+Latitude = Annotated[float, Field(ge=-90, le=90)]
 
 
 # -- coarse motion ------------------------------------------------------------------------------------------------
@@ -39,6 +43,8 @@ class Motion(Table):
     """How it meets the border of the domain: "open" flows through, "wall" is a closed box."""
     passes_obstacles: ClassVar[bool] = False
     """Whether it goes round the obstacles by itself."""
+    has_gaps: ClassVar[bool] = False
+    """Whether it may have no values somewhere: these places are solid."""
     reads: ClassVar[Reads] = ()
     """What `make` reads of the scene beside the table itself."""
 
@@ -49,6 +55,10 @@ class Motion(Table):
     def settings(self, scene: SceneInFlow) -> dict[str, Any]:
         """What `synth.motion.coarse` takes."""
         return self.model_dump(exclude={"kind", "size"})
+
+    def gaps(self, scene: SceneInFlow) -> list[obstacle.Obstacle]:
+        """Where it has no values: one solid, or none if it has them everywhere."""
+        return []
 
     def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
         """L, world units per second. A simulation is run from its start: at its resolution that costs little."""
@@ -176,7 +186,74 @@ def _alike(cells: tuple[int, ...], size: tuple[int, ...]) -> bool:
     return all(n * size[1] == cells[1] * m for n, m in zip(cells, size, strict=True))
 
 
-Coarse = SmokeMotion | NoiseMotion | WakeMotion | AnalyticMotion | FileMotion
+class NetcdfMotion(Motion):
+    """L from NetCDF: winds or currents on latitude and longitude, over time. Where values are missing, L is 0 and the
+    domain solid. L is the data's, divergence and all; where there are [[obstacles]] too, its part that is free of
+    divergence and goes round both."""
+
+    has_gaps: ClassVar[bool] = True
+
+    kind: Literal["netcdf"] = key("a field on latitude and longitude, over time")
+    file: Asset = key("NetCDF 3 or 4")
+    u: str = key("name of the eastward component", "u", min_length=1, max_length=200)
+    v: str = key("name of the northward component", "v", min_length=1, max_length=200)
+    size: Grid = grid("columns and rows of L", (64, 64))
+    window: Annotated[tuple[Longitude, Latitude, Longitude, Latitude], Strict(False)] | None = key(
+        "west, south, east, north, of which the domain shows the largest part of its proportions, a degree as long in "
+        "both directions; none: all there is", None, "degrees")
+    first: int = key("first time step, counted from 0", 0, ge=0, le=10**6)
+    last: Annotated[int, Field(ge=0, le=10**6)] | None = key("last time step; none: the last there is", None)
+    step: float = key("time from a time step to the next; between them L is interpolated, after the last it stays",
+                      30.0, "frames", gt=0, le=100000)
+    cyclic: bool = key("after the last time step comes the first again, as in a climatology", False)
+    speed: float = key("rms speed of all time steps, to which the file's is scaled", 0.1, "heights per second", gt=0,
+                       le=1000)
+
+    def faults(self, scene: SceneInFlow) -> Faults:
+        if scene.dimension == 3:
+            yield "coarse.kind", f'"netcdf" is a flow of the plane; {scene.cells_key} is {listed(scene.cells)}'
+        if self.last is not None and self.last < self.first:
+            yield "coarse.last", f"is before coarse.first, {self.first}"
+        if self.window and self.window[1] >= self.window[3]:
+            yield "coarse.window", "has its south not below its north"
+        if self.window and self.window[2] - self.window[0] > 360:
+            yield "coarse.window", "is wider than the globe"
+
+    def _read(self) -> netcdf.Currents:
+        found = netcdf.read_foreign(self.file, "coarse", self.u, self.v, self.first, self.last, self.window)
+        if not (found.u.any() or found.v.any()):
+            raise BadInput(self.file, "coarse.file", f"{self.u} and {self.v} are 0 wherever they have values")
+        return found
+
+    def gaps(self, scene: SceneInFlow) -> list[obstacle.Obstacle]:
+        from synth import obstacle
+
+        share = self._read().on(scene.shape)[1]
+        cell = 1.0 / scene.shape[0]
+        corner = tuple(c - cell for c in domain_origin(scene.shape))
+        solid = obstacle.level_set(scene.shape, MotionField(np.pad(share - 0.5, 1, mode="edge"), cell, corner))
+        if (solid.distance < 0.5).all():
+            raise BadInput(self.file, "coarse.file", "has no values in the domain")
+        return [solid] if solid.solid.any() else []
+
+    def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
+        """L, world units per second."""
+        values, share = self._read().on(self.size[::-1])
+        rms = np.sqrt(np.mean(np.sum(values[:, share >= 0.5].astype(np.float64) ** 2, axis=-1)))
+        values *= np.float32(self.speed / max(rms, 1e-30))
+        for frame in frames:
+            time = (frame - 1) / self.step
+            time = time % len(values) if self.cyclic else min(time, len(values) - 1)
+            before = int(time)
+            t, after = np.float32(time - before), (before + 1) % len(values)
+            field = MotionField.centred((1 - t) * values[before] + t * values[after], 2)
+            if "solid" in inputs:
+                past = past_obstacles(scene, inputs, field.per_frame(scene.fps).values)
+                field = MotionField.centred(past, 2).per_second(scene.fps)
+            yield frame, field
+
+
+Coarse = SmokeMotion | NoiseMotion | WakeMotion | AnalyticMotion | FileMotion | NetcdfMotion
 
 
 # -- obstacles ----------------------------------------------------------------------------------------------------
@@ -303,6 +380,11 @@ class SceneInFlow(SceneTables):
         return self.coarse is not None and self.coarse.is_field
 
     @property
+    def has_gaps(self) -> bool:
+        """Whether the coarse motion may have no values somewhere."""
+        return self.flows and self.coarse.has_gaps
+
+    @property
     def border(self) -> str:
         """How the motion meets the border of the domain: "wall" or "open"."""
         return self.coarse.border if self.flows else "open"
@@ -333,15 +415,19 @@ def obstacles_fit(scene: SceneInFlow) -> Faults:
         yield from scene.coarse.faults(scene)
 
 
-def make_solid(scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
-    """The distance to the walls of all obstacles, world units, negative inside.
+def make_solid(scene: SceneInFlow, inputs: Inputs, frames: list[int], gaps: bool = False,
+               ) -> Iterator[tuple[int, MotionField]]:
+    """The distance to the walls of all obstacles, world units, negative inside; with `gaps` also to where the coarse
+    motion has no values, and without either far from everywhere.
 
     Raises ValueError where they fill the domain or one lies outside it, BadInput for a file that cannot be used.
     """
     from synth import obstacle
 
     solids = [one.solid(scene.shape, f"obstacles[{number}]") for number, one in enumerate(scene.obstacles)]
-    yield 0, MotionField.centred(obstacle.union(solids).distance / scene.shape[-2], scene.dimension)
+    solids += scene.coarse.gaps(scene) if gaps else []
+    distance = obstacle.union(solids).distance if solids else np.full(scene.shape, np.float32(sum(scene.shape)))
+    yield 0, MotionField.centred(distance / scene.shape[-2], scene.dimension)
 
 
 def upsampled(L: MotionField, scene: SceneInFlow) -> np.ndarray:
@@ -352,26 +438,28 @@ def upsampled(L: MotionField, scene: SceneInFlow) -> np.ndarray:
 
 
 def walls(scene: SceneInFlow, inputs: Inputs) -> np.ndarray | None:
-    """Cells of H to the nearest wall, negative inside, (Y, X) or (Z, Y, X) float32; None without obstacles."""
+    """Cells of H to the nearest wall, negative inside, (Y, X) or (Z, Y, X) float32; None without obstacles and
+    gaps."""
     return inputs.read("solid").values * scene.shape[-2] if "solid" in inputs else None
 
 
 def solid_input(scene: SceneInFlow) -> Needs:
-    """The input of what knows the obstacles."""
-    return (("solid", "once"),) if scene.obstacles else ()
+    """The input of what knows the obstacles, and the gaps of the coarse motion."""
+    return (("solid", "once"),) if scene.obstacles or scene.has_gaps else ()
 
 
 def solid_artifacts(scene: SceneInFlow) -> tuple[Artifact, ...]:
-    """The distance to the walls, where there are obstacles."""
-    if not scene.obstacles:
+    """The distance to the walls, where there are obstacles or may be gaps."""
+    if not solid_input(scene):
         return ()
-    return (Artifact("solid", "synth", fields.distance(scene.dimension), ("obstacles", "shape", "dimension"), (),
-                     make_solid, animated=False),)
+    reads = ("obstacles", "shape", "dimension", *(("coarse",) if scene.has_gaps else ()))
+    return (Artifact("solid", "synth", fields.distance(scene.dimension), reads, (), make_solid,
+                     {"gaps": True} if scene.has_gaps else {}, animated=False),)
 
 
 def coarse_artifact(scene: SceneInFlow) -> Artifact:
     """L."""
     past = ("shape", "border") if scene.obstacles and not scene.coarse.passes_obstacles else ()
     reads = ("coarse", "seed", "fps", "dimension", *scene.coarse.reads, *past)
-    return Artifact("L", "synth", fields.velocity(scene.dimension, scene.fps), reads, solid_input(scene),
-                    scene.coarse.make)
+    return Artifact("L", "synth", fields.velocity(scene.dimension, scene.fps), reads,
+                    solid_input(scene) if scene.obstacles else (), scene.coarse.make)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tiny
+from scipy.io import netcdf_file
 
 from pipeline import cli, flow
 from pipeline.build.graph import computed
@@ -411,3 +412,123 @@ def test_what_goes_round_the_obstacles_by_itself_declares_no_border(coarse: str)
     assert ("border" in artifact.reads) == ("wake" not in coarse)
     assert dict(artifact.inputs) == {"solid": "once"}
     assert scene.border == ("wall" if "smoke" in coarse else "open")
+
+
+# -- a wind on latitude and longitude -----------------------------------------------------------------------------
+
+
+def wind(land: bool = True, speed: float = 3) -> Path:
+    """wind.nc, 40 × 30 degrees: east wind, a moment later north wind; land in its north-east quarter."""
+    latitude, longitude = np.arange(-14.5, 15), np.arange(-9.5, 30)
+    u, v = np.zeros((2, 2, 30, 40), np.float32)
+    u[0], v[1] = -speed, -2 * speed
+    if land:
+        u[:, 15:, 20:] = -999
+    with netcdf_file("wind.nc", "w") as written:
+        for name, values in (("time", np.arange(2.0)), ("lat", latitude[::-1]), ("lon", longitude)):
+            written.createDimension(name, len(values))
+            written.createVariable(name, "f8", (name,))[:] = values
+        for name, field in (("u", u), ("v", v)):
+            one = written.createVariable(name, "f4", ("time", "lat", "lon"))
+            one[:] = field[:, ::-1]
+            one._FillValue = np.float32(-999)
+    return Path("wind.nc")
+
+
+WIND = 'kind = "netcdf"\nfile = "wind.nc"\nsize = [16, 12]\nstep = 2'
+BREEZE = tiny.changed(tiny.TEXTURE, 'kind = "analytic"\nflow = "rotation"\nsize = [16, 12]', WIND + "\nspeed = 2.0")
+NORTH_EAST = np.outer(np.arange(12) >= 6, np.arange(16) >= 8)
+
+
+def netcdf_scene(old: str = "", new: str = "") -> Any:
+    return tiny.scene(Path(), tiny.changed(BREEZE, old, new))
+
+
+def test_a_wind_is_interpolated_in_time_and_rests_on_land() -> None:
+    wind()
+    scene = netcdf_scene("frames = 3", "frames = 6")
+    (artifact,) = flow.solid_artifacts(scene)
+    assert artifact.reads[-1] == "coarse" and not dict(flow.coarse_artifact(scene).inputs)
+    ((_, solid),) = computed(artifact, scene, tiny.Memory(Path()), [0])
+    assert np.array_equal(solid.values < 0, np.kron(NORTH_EAST, np.ones((4, 4), bool)))
+    assert solid.values[24, 0] == pytest.approx(0.5 * 64 / 48, abs=0.6 / 48)  # heights
+    found = motion(scene, [1, 2, 3, 6])
+    unit = 2 / np.sqrt((9 + 36) / 2)  # rms 2 heights per second over both moments
+    for frame, expected in ((1, (-3, 0)), (2, (-1.5, -3)), (3, (0, -6)), (6, (0, -6))):
+        values = found[frame].values
+        assert not values[NORTH_EAST].any()
+        assert np.allclose(values[~NORTH_EAST], np.array(expected) * unit, atol=1e-5)
+    assert motion(scene, [2]) == {2: found[2]}
+    cyclic = motion(netcdf_scene("step = 2", "step = 2\ncyclic = true"), [3, 4, 5])
+    assert np.allclose(cyclic[4].values[~NORTH_EAST], np.array((-1.5, -3)) * unit, atol=1e-5)
+    assert np.allclose(cyclic[5].values, found[1].values)
+
+
+def test_a_wind_without_gaps_has_no_walls_but_those_of_obstacles() -> None:
+    wind(land=False)
+    scene = netcdf_scene("[texture]", f"{BALL}\n[texture]")
+    bare = netcdf_scene()
+    (artifact,) = flow.solid_artifacts(bare)
+    ((_, far),) = computed(artifact, bare, tiny.Memory(Path()), [0])
+    assert far.values.min() > 2
+    (artifact,) = flow.solid_artifacts(scene)
+    ((_, solid),) = computed(artifact, scene, tiny.Memory(Path()), [0])
+    assert np.allclose(solid.values * 48, obstacle.ball((48, 64), (0, 0.5), 0.2).distance, atol=1e-5)
+    assert {"shape", "border"} <= set(flow.coarse_artifact(scene).reads)
+    found = motion(scene, [1], solid)[1]
+    assert found.shape == (48, 64)
+    assert np.sqrt(np.mean(divergence(found.per_frame(30).values, "open", solid.values * 48) ** 2)) < 1e-3
+
+
+def test_land_and_obstacles_are_one_solid() -> None:
+    wind()
+    scene = netcdf_scene("[texture]", f"{BALL.replace('0.0, 0.5', '-0.4, 0.3')}\n[texture]")
+    (artifact,) = flow.solid_artifacts(scene)
+    ((_, solid),) = computed(artifact, scene, tiny.Memory(Path()), [0])
+    ball = obstacle.ball((48, 64), (-0.4, 0.3), 0.2).solid
+    assert np.array_equal(solid.values < 0, ball | np.kron(NORTH_EAST, np.ones((4, 4), bool)))
+
+
+@pytest.mark.parametrize("method", ["carry", "paper"])
+def test_there_is_no_texture_on_land(method: str) -> None:
+    wind()
+    graph = tiny.made(Path(), tiny.changed(BREEZE, "size = [64, 48]", f'size = [64, 48]\nmethod = "{method}"'))
+    for frame in (1, 2, 3):
+        picture = images.read_picture(graph.file("", "frames", frame))[::-1]
+        land = np.kron(NORTH_EAST, np.ones((4, 4), bool))
+        assert not picture[land].any()
+        assert (picture[~land].max(-1) > 0).mean() > 0.98
+
+
+def test_motion_fields_keep_out_of_land_too() -> None:
+    wind()
+    written("", coarse=WIND.replace("step = 2", "step = 2\nspeed = 1.0"))
+    assert cli.run(["figure", "tiny.toml"]) == 0
+    away = images.read_field(Path("out/tiny/fields/solid.exr")).values * 24
+    L, H = (images.read_field(Path(f"out/tiny/fields/{name}.0002.exr")) for name in ("L", "H"))
+    detail = to_world(H.values, axes_2d(upsampled(L, load(Path("tiny.toml")).variants[""])))
+    near_land = np.abs(away) < 0.5
+    assert near_land.any()
+    through = np.sum(detail * obstacle.outward(away), -1)[near_land]
+    assert np.sqrt(np.mean(through**2)) < 0.02 * np.sqrt(np.mean(H.values**2))
+
+
+@pytest.mark.parametrize(("old", "new", "expected"), [
+    ("step = 2", 'u = "uwnd"', "wind.nc: coarse.u: no variable 'uwnd'; the file has: u, v"),
+    ("step = 2", "first = 2", "coarse.first: the file has 2 time steps, the last of which is number 1"),
+    ("step = 2", "first = 1\nlast = 0", "coarse.last: is before coarse.first, 1"),
+    ("step = 2", "window = [0, 5, 10, -5]", "coarse.window: has its south not below its north"),
+    ("step = 2", "window = [-100, -5, 300, 5]", "coarse.window: is wider than the globe"),
+    ("step = 2", "window = [12, 2, 28, 14]", "wind.nc: coarse.window: no place has values of both at all time steps"),
+    ("step = 2", "step = 3", "wind.nc: coarse.file: u and v are 0 wherever they have values"),
+    ("[16, 12]", "[16, 16]", "texture.size: 64×48 has not the shape of coarse.size, 16×16"),
+])
+def test_a_wind_that_does_not_fit_is_refused(capsys: pytest.CaptureFixture[str], old: str, new: str, expected: str,
+                                             ) -> None:
+    wind(speed=0 if "are 0" in expected else 3)
+    Path("tiny.toml").write_text(tiny.changed(BREEZE, old, new))
+    before = sorted(Path().rglob("*"))
+    assert cli.run(["figure", "tiny.toml"]) == 2
+    err = capsys.readouterr().err
+    assert expected in err and err.count("\n") == 1, err
+    assert sorted(Path().rglob("*")) == before

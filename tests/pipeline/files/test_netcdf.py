@@ -233,7 +233,7 @@ def test_a_spoilt_file_is_refused_by_the_child(version: int, how: str) -> None:
         Path("a.nc").write_bytes({"empty": b"", "cut short": content[:2 * len(content) // 3], "text": b"nothing",
                                   "zeros": content[:8] + bytes(len(content) - 8)}[how])
     line = refused()
-    assert line.startswith("a.nc: coarse.file: ")
+    assert line.startswith("a.nc: coarse.u: " if (how, version) == ("zeros", 3) else "a.nc: coarse.file: ")
     assert any(word in line for word in ("no such file", "is no NetCDF file", "damaged", "no variable")), line
 
 
