@@ -13,6 +13,7 @@ In the order data passes through them:
     pyramid     image pyramids of fields
     motion/     motion field texture synthesis (ma09)
     elements/   dynamic element textures (ma13)
+    texture/    directional moving texture (wang05)
     particles   particles carried by a motion field, past obstacles
     seaweed     a bed of seaweed that a motion field bends
 
