@@ -211,5 +211,5 @@ def render_fits(scene: Scene) -> Faults:
 
 def samples_fit(scene: Scene) -> Faults:
     """Check: samples that move, and the obstacles."""
-    if scene.obstacles and scene.detail.boundary and scene.detail.samples == "lagrangian":
+    if (scene.obstacles or scene.has_gaps) and scene.detail.boundary and scene.detail.samples == "lagrangian":
         yield "detail.samples", "samples that move do not observe a boundary: say boundary = false"

@@ -81,7 +81,8 @@ def make_by_pixels(scene: TextureScene, inputs: Inputs, frames: list[int]) -> It
     """The paper's first frame, its pixels moved one by one along the flow of each frame (figure 3)."""
     from synth.texture import paper
 
-    synthesis = paper.Synthesis(_sample(scene, inputs), scene.shape, scene.paper.settings(), scene.seed)
+    rows, columns = scene.shape
+    synthesis = paper.Synthesis(_sample(scene, inputs), (rows, columns), scene.paper.settings(), scene.seed)
     first = synthesis.picture(synthesis.frame(velocity(scene, inputs, 1), None))
     for frame in frames:
         yield frame, paper.moved_pixels(first, velocity(scene, inputs, frame), frame - 1)[::-1]
