@@ -63,6 +63,8 @@ LIVELY = 8.0
 """σ, in pixels, of the round in which the sample's variance counts."""
 RING = (0.6, 0.8)
 """Radii between which a patch is compared with its neighbours."""
+BESIDE = 0.5
+"""Radii from a patch that is replaced to the newborn that replaces it."""
 WORN = 1.5
 """A seam is repaired where its error has grown so many times since the patch was full-grown."""
 
@@ -265,13 +267,12 @@ class Synthesis:
         return self.painter.strongest(table, lists, _open(state))
 
     def renewed(self, state: State) -> float:
-        """Share of the pixels that this frame drew anew: a growing patch took them over."""
+        """Share of the pixels that this frame drew anew: another patch took them over, since it grew or one faded."""
         table, lists = self._tables(state)
-        growing = np.append((state.age < self.settings.growth) & ~state.fading, False)
         now = self.painter.owners(table, lists, _open(state))
         before = self.painter.owners(table, lists, _open(state), BEFORE)
         textured = state.mask.sum() if state.mask.size else now.size
-        return float((growing[now] & (now != before)).sum() / max(int(textured), 1))
+        return float((now != before).sum() / max(int(textured), 1))
 
     # what a frame goes by
 
@@ -326,10 +327,10 @@ class Synthesis:
         values[:, INVERSE] = np.float32(1) / (now.radius * now.radius)
         values[:, STEEP] = np.float32(s.sharpness) * now.radius
         step = np.where(now.fading, 1, -1).astype(np.float32) / np.float32(s.growth)
-        earlier = np.where(now.fading | (now.age < s.growth), np.clip(now.weight + step, 0, 1), now.weight)
+        earlier = np.where(now.fading | (now.age <= s.growth), np.clip(now.weight + step, 0, 1), now.weight)
         for column, weight in ((BIAS, now.weight), (BEFORE, earlier)):
             values[:, column] = values[:, STEEP] * np.float32(s.head_start) * (np.float32(1) - weight)
-        values[(now.age == 0) & (now.weight == 0), BEFORE] = NEVER
+        values[now.age == 0, BEFORE] = NEVER
         values[:, RADIUS] = now.radius
         if ground is None and now.mask.size:
             ground = Ground(np.zeros(0), None, now.mask, self.painter.walls(now.mask).clear)
@@ -368,10 +369,10 @@ class Synthesis:
         centre = state.centre + np.rint(step * GRID) / GRID
         # 2. gone
         by = np.float32(1 / self.settings.growth)
-        weight = np.where(state.fading, np.maximum(state.weight - by, 0), np.minimum(state.weight + by, 1))
+        weight = np.where(state.fading, state.weight - by, np.minimum(state.weight + by, 1))
         outside = np.maximum(-centre, centre - (np.array(self.shape[::-1]) - 1)).max(axis=1, initial=-np.inf)
         far = max(float(self.painter.extent(np.array(self.radius[1]))), INFLOW) + 6
-        stays = ~(state.fading & (weight == 0)) & (outside < far) & ground.is_open(centre)
+        stays = ~(state.fading & (weight <= 0)) & (outside < far) & ground.is_open(centre)
         # 3. turn
         now = replace(state, frame=state.frame + 1, centre=centre, weight=weight.astype(np.float32),
                       age=state.age + np.int32(1), mask=_kept(ground))
@@ -428,7 +429,7 @@ class Synthesis:
         if s.repair == 0 or not len(now.id):
             return now, {}
         # 1. compare
-        full = (now.age >= s.growth) & ~now.fading & _inside(now.centre, self.shape)
+        full = (now.weight == 1) & ~now.fading & _inside(now.centre, self.shape)
         tested = np.flatnonzero(full & ((now.id + now.frame) % round(1 / s.repair) == 0)).astype(np.int32)
         if not len(tested):
             return now, {}
@@ -444,7 +445,7 @@ class Synthesis:
         fading = now.fading.copy()
         fading[worst] = True
         count = len(now.id)
-        now = self._with_newborns(replace(now, fading=fading), now.centre[worst], ground)
+        now = self._with_newborns(replace(now, fading=fading), self._beside(now, worst, ground), ground)
         return now, {count + k: int(old) for k, old in enumerate(worst)}
 
     def _seams(self, now: State, who: np.ndarray, ground: Ground) -> np.ndarray:
@@ -466,6 +467,15 @@ class Synthesis:
         count = asked.sum(axis=1)
         error = np.sqrt(squared / np.maximum(count, 1) / painter.variance)
         return np.where(count > 0, error, -1).astype(np.float32)
+
+    def _beside(self, now: State, who: np.ndarray, ground: Ground) -> np.ndarray:
+        """A place BESIDE radii from the centres of patches `who` (Q,), at random: (Q, 2) float64; no such place in a
+        mask. Of two patches with one centre the whole cell would change hands at once."""
+        random = np.random.Generator(np.random.Philox(key=[self.seed, now.frame], counter=[0, 0, 1, 0]))
+        angle = random.uniform(0, 2 * np.pi, len(who))
+        offset = BESIDE * now.radius[who].astype(np.float64)[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1)
+        beside = now.centre[who] + np.rint(offset * GRID) / GRID
+        return np.where(ground.is_open(beside)[:, None], beside, now.centre[who])
 
     # 4. bear
 
