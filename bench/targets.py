@@ -6,6 +6,7 @@ so; a target that is not met says MISSED.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from statistics import mean
 from typing import Any, NamedTuple
@@ -216,27 +217,25 @@ def texture(found: dict[str, Any]) -> Iterable[Row]:
 
 def _look(whose: str, frames: list[dict[str, Any]], motion: list[dict[str, Any]]) -> Iterable[Row]:
     """What is asked of all textures alike: the worst of them against its target, and how many meet it."""
-    def worst(rows: list[dict[str, Any]], what: str, keys: tuple[str, ...], low: float, high: float, unit: str,
+    def worst(rows: list[dict[str, Any]], what: str, keys: tuple[str, ...], low: float | None, high: float, unit: str,
               shown: Callable[[float], str]) -> Row:
-        def beyond(value: float) -> float:
-            return max(low - value, value - high)
-
+        least = -math.inf if low is None else low
         values = [(row[key], key, row) for row in rows for key in keys]
-        value, key, row = max(values, key=lambda entry: (entry[0] != entry[0], beyond(entry[0])))
+        value, key, row = max(values, key=lambda v: (math.isnan(v[0]), max(least - v[0], v[0] - high)))
         names = {r["texture"] for r in rows}
-        good = len(names - {r["texture"] for v, _, r in values if not low <= v <= high})
+        good = len(names - {r["texture"] for v, _, r in values if not least <= v <= high})
         where = f"{row['texture']}, frame {row['frame']}" if "frame" in row else row["texture"]
         of = f"{key}, {where}" if len(keys) > 1 else where
-        target = f"≤ {shown(high)}{unit}" if low == 0 else f"{shown(low)} to {shown(high)}{unit}"
+        target = f"≤ {shown(high)}{unit}" if low is None else f"{shown(low)} to {shown(high)}{unit}"
         return Row(f"{whose}: {what}", f"worst {shown(value)}{unit} ({of}); {good} of {len(names)} within", target,
-                   low <= value <= high, NOT_REPORTED)
+                   least <= value <= high, NOT_REPORTED)
 
     yield worst(frames, "contrast and gradient over the sample's", ("std", "grad"), 0.85, 1.10, "", "{:.2f}".format)
-    yield worst(frames, "histogram error", ("hist",), 0, 0.10, "", "{:.2f}".format)
-    yield worst(motion, "synthesised anew in a frame", ("synthesised anew, %",), 0, 2, " %", "{:.2g}".format)
-    yield worst(motion, "worst block", ("worst block",), 0, 0.8, "", "{:.2g}".format)
-    yield worst(motion, "drift of the backward distance", ("drift of bwd",), 0, 0.02, "", "{:.3f}".format)
-    yield worst(motion, "drift of the share that is used", ("drift of used",), 0, 0.04, "", "{:.3f}".format)
+    yield worst(frames, "histogram error", ("hist",), None, 0.10, "", "{:.2f}".format)
+    yield worst(motion, "synthesised anew in a frame", ("synthesised anew, %",), None, 2, " %", "{:.2g}".format)
+    yield worst(motion, "worst block", ("worst block",), None, 0.8, "", "{:.2g}".format)
+    yield worst(motion, "drift of the backward distance", ("drift of bwd",), None, 0.02, "", "{:.3f}".format)
+    yield worst(motion, "drift of the share that is used", ("drift of used",), None, 0.04, "", "{:.3f}".format)
 
 
 def _texture_times(found: dict[str, Any], by_paper: dict[str, dict[str, Any]]) -> Iterable[Row]:

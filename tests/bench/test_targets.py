@@ -119,6 +119,16 @@ def test_one_bad_texture_misses_one_target_and_is_named(table: str, texture: str
     assert what in missed[0].what
 
 
+@pytest.mark.parametrize(("table", "key", "value", "measured"), [
+    ("frame by frame", "hist", 0.09, "worst 0.09 (brick on waves, frame 100); 3 of 3 within"),
+    ("frame by frame", "grad", 0.86, "worst 0.86 (grad, brick on waves, frame 100); 3 of 3 within"),
+    ("in motion", "synthesised anew, %", 1.9, "worst 1.9 % (brick on waves); 3 of 3 within"),
+    ("in motion", "drift of bwd", 0.019, "worst 0.019 (brick on waves); 3 of 3 within")])
+def test_the_worst_is_named_where_the_target_is_met_too(table: str, key: str, value: float, measured: str) -> None:
+    rows = list(targets.texture(changed(table, "brick on waves", **{key: value})))
+    assert [row.verdict for row in rows if row.measured == measured] == ["met"]
+
+
 @pytest.mark.parametrize(("key", "value", "missed"), [
     ("time and memory", [{"size": "512²", **SECONDS, "wall ms": 33.5}, {"size": "1024²", "peak memory MB": 400}],
      "34 ms (15 ms of processor time)"),
