@@ -15,8 +15,8 @@ remote,
 which is a power diagram where t is small; beyond t = 1 a patch shows nothing. Others have a share where they are less
 than 4 more remote, by (1 - Δe / 4)⁴, which is near exp(-Δe).
 
-Hot: `draw` is most of a frame (about 10 CPU ms for 512² pixels). It is bound by the reads of the sample, four for each
-patch that has a share in one of 16 pixels.
+Hot: `draw` is half of a frame (about 14 CPU ms for 512² pixels in colour). It is bound by the reads of the sample, four
+for each patch that has a share in one of 16 pixels.
 """
 
 from __future__ import annotations
