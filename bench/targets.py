@@ -233,7 +233,7 @@ def _look(whose: str, frames: list[dict[str, Any]], motion: list[dict[str, Any]]
     yield worst(frames, "contrast and gradient over the sample's", ("std", "grad"), 0.85, 1.10, "", "{:.2f}".format)
     yield worst(frames, "histogram error", ("hist",), None, 0.10, "", "{:.2f}".format)
     yield worst(motion, "synthesised anew in a frame", ("synthesised anew, %",), None, 2, " %", "{:.2g}".format)
-    yield worst(motion, "worst block", ("worst block",), None, 0.8, "", "{:.2g}".format)
+    yield worst(motion, "worst block", ("worst block",), None, 0.8, "", "{:.2f}".format)
     yield worst(motion, "drift of the backward distance", ("drift of bwd",), None, 0.02, "", "{:.3f}".format)
     yield worst(motion, "drift of the share that is used", ("drift of used",), None, 0.04, "", "{:.3f}".format)
 
