@@ -97,7 +97,8 @@ def findings(graph: BuildGraph, folder: Path, record: dict[str, Any]) -> Iterato
         if old is None:
             yield Finding(made.path, "is new; the reference does not have it")
         elif made.path in record["files"]:
-            yield compared_values(made.path, made.values(made.file), made.values(folder / made.path))
+            finding = compared_values(made.path, made.values(made.file), made.values(folder / made.path))
+            yield replace(finding, is_light=made.is_light)
         else:
             yield compared_sums(made.path, references.sums(made.values(made.file)), old)
     for proof in references.proofs(graph):

@@ -45,6 +45,11 @@ class Made:
         """The values of `file`, which is this one or its reference."""
         return _numbers(self.artifact.format.read(file))
 
+    @property
+    def is_light(self) -> bool:
+        """Whether the values are a picture (h, w, 3) of linear light, top row first."""
+        return self.artifact.format.read is images.read_picture
+
 
 @dataclass(frozen=True)
 class Proof:

@@ -144,16 +144,16 @@ def lines(v: np.ndarray, width: int, seed: int = 1) -> np.ndarray:
     fine = resampled(v, height * OVERSAMPLING, width * OVERSAMPLING, order=3)
     texture, still = _noise(height, width, seed)
     length = int(STREAK * max(height, width)) // 4 * 2 + 1  # odd, so symmetric; half of it for each of two passes
-    streaks = _convolved(texture, averaged(fine, OVERSAMPLING), length, 2)
+    streaks = convolved(texture, averaged(fine, OVERSAMPLING), length, 2)
     finer = resampled(streaks, height * OVERSAMPLING, width * OVERSAMPLING)
-    streaks = averaged(_convolved(finer, fine, FINISH, 1), OVERSAMPLING)
+    streaks = averaged(convolved(finer, fine, FINISH, 1), OVERSAMPLING)
     moving = averaged(_moving(np.hypot(fine[..., 0], fine[..., 1])), OVERSAMPLING)
     grey = 0.5 + moving * _contrast(streaks, moving, CONTRAST)
     grey += (1.0 - moving) * _contrast(still, 1.0 - moving, STILL_CONTRAST)
     return np.clip(grey, 0.0, 1.0)[::-1].astype(np.float32)
 
 
-def _convolved(texture: np.ndarray, v: np.ndarray, length: int, passes: int) -> np.ndarray:
+def convolved(texture: np.ndarray, v: np.ndarray, length: int, passes: int) -> np.ndarray:
     """A positive texture (h, w) averaged along v (h, w, 2) with a Hann window of `length` pixels, `passes` times."""
     import rlic
 

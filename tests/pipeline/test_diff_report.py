@@ -1,5 +1,7 @@
 """The report of a diff: what stands in the page, what the picture shows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,13 @@ def test_same_says_so_and_the_same_again_is_the_same_page(tmp_path):
     assert "all 3 comparisons are the same" in pages[0].read_text()
     for name in ("index.html", "diff.png"):
         assert pages[0].with_name(name).read_bytes() == pages[1].with_name(name).read_bytes()
+
+
+def test_colours_are_shown_as_light_in_their_own_shape(tmp_path):
+    colours = np.linspace(0, 1, 64 * 48 * 3, dtype=np.float32).reshape(64, 48, 3)
+    finding = replace(compared_values("fields/frames.0004.exr", colours, colours), is_light=True)
+    shown = pictures.read(diff_report.write("x", [finding], tmp_path).with_name("diff.png"))
+    assert shown.shape[0] < 2 * diff_report.WIDTH  # the row of panels is no taller than they are
 
 
 def test_without_pictures_there_is_no_picture(tmp_path):

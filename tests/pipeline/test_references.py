@@ -8,6 +8,7 @@ import tiny
 
 from pipeline import cli, diff, references, stages
 from pipeline.errors import BadInput
+from pipeline.files import pictures
 from pipeline.scene import load
 from pipeline.tables import PROJECT_SCENES
 
@@ -205,3 +206,14 @@ figure = { panel = 16 }
     file.write_text(file.read_text().replace("count = 40", "count = 41"))
     assert cli.run(["diff", str(file), *out]) == 1
     assert "particles.0001.ply: " in capsys.readouterr().out
+
+
+def test_frames_of_a_texture_are_reported_as_the_pictures_they_are(tmp_path):
+    file = tmp_path / "canes.toml"
+    file.write_text(tiny.TEXTURE)
+    out = ["--out", str(tmp_path / "out")]
+    assert cli.run(["references", str(file), *out]) == 0
+    assert cli.run(["diff", str(file), *out]) == 0
+    (picture,) = (tmp_path / "out").rglob("diff.png")
+    height, width = pictures.read(picture).shape[:2]
+    assert height < 2 * width  # a row for each of sample, flow and frame
