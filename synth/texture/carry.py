@@ -45,6 +45,7 @@ from synth.texture.patches import (
     Painter,
     Query,
     Table,
+    pairs_within,
     sees_reference,
 )
 from synth.texture.sample import Sample, luminance
@@ -614,12 +615,13 @@ class Synthesis:
     def _rounds(self, now: State, new: np.ndarray) -> np.ndarray:
         """The round of each newborn, from 1, in the order given."""
         centre, extent = now.centre[new], self.painter.extent(now.radius[new])
-        reach = MATCHED * np.sqrt(self.settings.elongation) * now.radius[new][:, None] + extent[None, :]
-        offset = centre[:, None] - centre[None]
-        near = (offset * offset).sum(axis=2) <= reach * reach
+        later, earlier = pairs_within(centre, centre, MATCHED * np.sqrt(self.settings.elongation) * now.radius[new],
+                                      extent)
+        starts = np.searchsorted(later, np.arange(len(new) + 1))
         rounds = np.zeros(len(new), np.int32)
         for k in range(len(new)):
-            rounds[k] = 1 + rounds[:k][near[k, :k]].max(initial=0)
+            # those not yet numbered are later ones: 0
+            rounds[k] = 1 + rounds[earlier[starts[k]:starts[k + 1]]].max(initial=0)
         return rounds
 
     def _dear(self, usage: np.ndarray) -> np.ndarray:

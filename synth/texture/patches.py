@@ -28,6 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from synth import opencl
 from synth.texture import flow
@@ -191,9 +192,8 @@ class Painter:
         """For each of the patches `who` (Q,) all that reach a place within `radius` (Q,) of its centre."""
         centre, extent = table.centres, self.extent(table.values[:, RADIUS])
         # a bent place lies farther away than it would unbent
-        reach = 1.6 * np.sqrt(self.elongation) * radius[:, None] + extent[None, :] + 1
-        offset = centre[who][:, None, :] - centre[None, :, :]
-        query, patch = np.nonzero((offset * offset).sum(axis=2) <= reach * reach)
+        own = 1.6 * np.sqrt(self.elongation) * radius + 1
+        query, patch = pairs_within(centre[who], centre, own, extent)
         return _lists(query, patch, len(who))
 
     # the kernels
@@ -392,6 +392,23 @@ class Places:
 
 def _literal(value: float) -> str:
     return f"{np.float32(value)!s}f"
+
+
+def pairs_within(queries: np.ndarray, points: np.ndarray, own: np.ndarray,
+                 extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All pairs (query, point) no farther apart than own[query] + extent[point], by query, then by point: int64 each.
+
+    queries (Q, 2), points (P, 2) float64; the memory grows with the pairs found, not with Q times P.
+    """
+    if not len(queries) or not len(points):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    # the tree rounds in its own way: it proposes a little more, and the test below decides
+    found = cKDTree(points).query_ball_point(queries, (own + extent.max()) * (1 + 1e-9) + 1e-9, return_sorted=True)
+    query = np.repeat(np.arange(len(queries)), [len(near) for near in found])
+    point = np.concatenate(found).astype(np.int64)
+    offset, reach = queries[query] - points[point], own[query] + extent[point]
+    near = (offset * offset).sum(axis=1) <= reach * reach
+    return query[near], point[near]
 
 
 def _lists(key: np.ndarray, members: np.ndarray, count: int) -> Lists:

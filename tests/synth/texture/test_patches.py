@@ -23,6 +23,7 @@ from synth.texture.patches import (
     enlarged,
     match_reference,
     owners_reference,
+    pairs_within,
     rectify_reference,
     sees_reference,
     sites,
@@ -253,3 +254,14 @@ def test_each_tile_lists_the_patches_that_reach_it():
         if row >= 0 and column >= 0:
             found = np.unique(owner[row * TILE:(row + 1) * TILE, column * TILE:(column + 1) * TILE])
             assert set(found) - {-1} <= set(here)
+
+
+@pytest.mark.parametrize(("queries", "points"), [(40, 70), (1, 1), (0, 5), (5, 0)])
+def test_pairs_within_are_those_of_all_pairs(queries, points):
+    random = np.random.default_rng(queries)
+    a, b = (random.uniform(0, 100, (n, 2)) for n in (queries, points))
+    own, extent = random.uniform(0, 20, queries), random.uniform(0, 20, points)
+    offset = a[:, None] - b[None]
+    expected = np.nonzero((offset * offset).sum(axis=2) <= (own[:, None] + extent) ** 2)
+    found = pairs_within(a, b, own, extent)
+    assert np.array_equal(found[0], expected[0]) and np.array_equal(found[1], expected[1])
