@@ -6,28 +6,9 @@ import sys
 import time
 from pathlib import Path
 
+import processes
 import pytest
 import tiny
-
-# runs the command line; the first time a file of this name is written and not yet renamed, it says so and waits
-HELD = """
-import pathlib, signal, sys, time
-from pipeline import cli
-from pipeline.files import atomic
-
-name, flag = sys.argv[1], pathlib.Path(sys.argv[2])
-sync = atomic._sync
-
-def held(path):
-    if name in path.name and path.name.endswith(atomic.SUFFIX):
-        flag.touch()
-        time.sleep(60)
-    sync(path)
-
-atomic._sync = held
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts background jobs with it ignored
-cli.main(sys.argv[3:])
-"""
 
 
 def run(folder: Path, scene: str = tiny.SMOKE, verb: str = "figure") -> dict[str, bytes]:
@@ -41,23 +22,7 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return run(tmp_path_factory.mktemp("reference"))
 
 
-def stopped(folder: Path, name: str, by: signal.Signals, scene: str = tiny.SMOKE,
-            verb: str = "figure") -> subprocess.CompletedProcess[str]:
-    """`flowloom figure`, or another verb, stopped while the file `name` is written and not yet in its place."""
-    tiny.written(folder, scene)
-    flag = folder / "flag"
-    command = [sys.executable, "-P", "-c", HELD, name, str(flag), verb, "tiny.toml"]
-    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 100
-    while not flag.exists() and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.send_signal(by)
-    try:
-        out, err = process.communicate(timeout=50)
-    finally:
-        process.kill()
-    assert flag.exists(), err
-    return subprocess.CompletedProcess(command, process.returncode, out, err)
+
 
 
 @pytest.mark.parametrize(("name", "by", "code"), [
@@ -76,7 +41,7 @@ def stopped(folder: Path, name: str, by: signal.Signals, scene: str = tiny.SMOKE
 ])
 def test_a_stopped_run_leaves_nothing_half_written_and_the_next_one_goes_on(
         tmp_path: Path, reference: dict[str, bytes], name: str, by: signal.Signals, code: int) -> None:
-    ended = stopped(tmp_path, name, by)
+    ended = processes.stopped(tmp_path, name, by)
     assert ended.returncode == code
     if code > 0:
         assert ended.stderr.count("\n") == 1
@@ -109,7 +74,7 @@ def solid_reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes
 ])
 def test_in_space_too_the_next_run_goes_on_with_the_same_bits(
         tmp_path: Path, solid_reference: dict[str, bytes], name: str, by: signal.Signals, code: int) -> None:
-    assert stopped(tmp_path, name, by, SOLID, "bake").returncode == code
+    assert processes.stopped(tmp_path, name, by, SOLID, "bake").returncode == code
     left = tiny.contents(tmp_path / "out" / "tiny")
     for path in left:
         if not any(part.startswith(".") for part in Path(path).parts):

@@ -4,13 +4,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import processes
 import pytest
 from tiny import BEADS, FISH, NOODLES, PAPER, changed, contents, graph, made, scene, written
 
@@ -65,46 +65,6 @@ def test_threads_too_thick_to_lie_beside_each_other(home: Path, tables: Any, ref
 
 # -- interrupted, farmed, kept
 
-# runs the command line; the first time a file of this name is written and not yet renamed, it says so and waits
-HELD = """
-import pathlib, signal, sys, time
-from pipeline import cli
-from pipeline.files import atomic
-
-name, flag = sys.argv[1], pathlib.Path(sys.argv[2])
-sync = atomic._sync
-
-def held(path):
-    if name in path.name and path.name.endswith(atomic.SUFFIX):
-        flag.touch()
-        time.sleep(60)
-    sync(path)
-
-atomic._sync = held
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts background jobs with it ignored
-cli.main(sys.argv[3:])
-"""
-
-
-def stopped(folder: Path, name: str, by: signal.Signals) -> subprocess.CompletedProcess[str]:
-    """`flowloom figure` of SEVERAL, stopped while the file `name` is written and not yet in its place (as
-    tests/pipeline/test_interrupt.py does)."""
-    written(folder, SEVERAL)
-    flag = folder / "flag"
-    command = [sys.executable, "-P", "-c", HELD, name, str(flag), "figure", "tiny.toml"]
-    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 100
-    while not flag.exists() and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.send_signal(by)
-    try:
-        out, err = process.communicate(timeout=50)
-    finally:
-        process.kill()
-    assert flag.exists(), err
-    return subprocess.CompletedProcess(command, process.returncode, out, err)
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """What an uninterrupted run leaves."""
@@ -121,7 +81,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 ])
 def test_a_stopped_run_goes_on_with_the_same_bits(tmp_path: Path, whole: dict[str, bytes], name: str,
                                                   by: signal.Signals, code: int) -> None:
-    assert stopped(tmp_path, name, by).returncode == code
+    assert processes.stopped(tmp_path, name, by, SEVERAL).returncode == code
     left = contents(tmp_path / "out" / "tiny")
     for path in left:
         if not any(part.startswith(".") for part in Path(path).parts):
