@@ -5,7 +5,7 @@ All are pictures in linear light, top row first; synth.texture has the lowest ro
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -48,18 +48,12 @@ def make_by_paper(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Ite
 
 def make_by_carry(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The frames by patches that carry coordinates into the sample."""
-    from synth.texture import carry
-
-    yield from ((frame, synthesis.picture(state)[::-1]) for frame, synthesis, state in _states(
-        scene, inputs, frames, carry, scene.carry.settings()))
+    yield from ((frame, synthesis.picture(state)[::-1]) for frame, synthesis, state in _carried(scene, inputs, frames))
 
 
 def make_maps(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The UV maps: (h, w, 6), u, v and weight of the strongest patch of each pixel, then of the next."""
-    from synth.texture import carry
-
-    yield from ((frame, synthesis.maps(state)[::-1]) for frame, synthesis, state in _states(
-        scene, inputs, frames, carry, scene.carry.settings()))
+    yield from ((frame, synthesis.maps(state)[::-1]) for frame, synthesis, state in _carried(scene, inputs, frames))
 
 
 def write_maps(file: Path, maps: np.ndarray) -> None:
@@ -97,12 +91,49 @@ def make_holes(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterat
         yield frame, shown[::-1]
 
 
+def _carried(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, Any, Any]]:
+    """(frame, synthesis, state) of each of `frames` by the method "carry"."""
+    from synth.texture import carry
+
+    if scene.texture.loop:
+        return _looped(scene, inputs, frames)
+    return _states(scene, inputs, frames, carry, scene.carry.settings())
+
+
+def _looped(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, Any, Any]]:
+    """(frame, synthesis, state) of each of `frames` of a loop. A run that goes on finds the same patches again."""
+    from synth.texture.loop import Loop
+
+    rows, columns = scene.shape
+    synthesis = Loop(_sample(scene, inputs), (rows, columns), scene.carry.settings(), scene.seed)
+    states = synthesis.states(_velocities(scene, inputs), scene.frames, _mask(scene, inputs))
+    yield from ((frame, synthesis, states[frame - 1]) for frame in frames)
+
+
+def _velocities(scene: TextureScene, inputs: Inputs) -> Callable[[int], np.ndarray]:
+    """The velocity at a frame; while L does not change it is found once."""
+    last: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def at(frame: int) -> np.ndarray:
+        L = inputs.read("L", frame).values
+        if not last or not np.array_equal(last[0][0], L):
+            last[:] = [(L, velocity(scene, inputs, frame))]
+        return last[0][1]
+
+    return at
+
+
+def _mask(scene: TextureScene, inputs: Inputs) -> np.ndarray | None:
+    """Where texture is, (Y, X) bool; None: everywhere."""
+    distance = walls(scene, inputs)
+    return None if distance is None else distance > 0
+
+
 def _states(scene: TextureScene, inputs: Inputs, frames: list[int], method: Any, settings: Any,
             ) -> Iterator[tuple[int, Any, Any]]:
     """(frame, synthesis, state) of each of `frames`. An interrupted run goes on from the last state: same bits."""
     synthesis = method.Synthesis(_sample(scene, inputs), scene.shape, settings, scene.seed)
-    distance = walls(scene, inputs)
-    mask = None if distance is None else distance > 0
+    mask = _mask(scene, inputs)
     kept = inputs.checkpoint.load(before=frames[0])
     done, state = (kept[0], method.State.of(kept[1])) if kept else (0, None)
     for frame in range(done + 1, frames[-1] + 1):
@@ -136,12 +167,14 @@ def make_zoom(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterato
 
 def frame_artifacts(scene: TextureScene) -> tuple[Artifact, ...]:
     """The frames; the holes and the flow where the figure shows them."""
-    needs: Any = (("sample", "once"), ("L", "until"), *solid_input(scene))
+    loop = scene.texture.loop
+    needs: Any = (("sample", "once"), ("L", "every" if loop else "until"), *solid_input(scene))
+    reads = (*READS, "frames") if loop else READS
     make, keys = {"carry": (make_by_carry, "carry"), "paper": (make_by_paper, "paper"),
                   "pixels": (make_by_pixels, "paper")}[scene.texture.method]
-    made = [Artifact("frames", "synth", images.LIGHT, (*READS, keys), needs, make)]
+    made = [Artifact("frames", "synth", images.LIGHT, (*reads, keys), needs, make)]
     if scene.texture.maps:
-        made.append(Artifact("uv", "synth", MAPS, (*READS, "carry"), needs, make_maps, export=True))
+        made.append(Artifact("uv", "synth", MAPS, (*reads, "carry"), needs, make_maps, export=True))
     if "holes" in scene.figure.panels:
         made.append(Artifact("holes", "synth", images.LIGHT, (*READS, "paper"), needs, make_holes))
     if scene.figure.zoom:

@@ -28,6 +28,8 @@ class Scene(TextureScene):
 
 def texture_fits(scene: Scene) -> Faults:
     """Check: sizes, speeds and moments."""
+    from synth.texture.loop import SHORTEST
+
     texture, size = scene.texture, scene.sample.size
     if size > min(texture.size):
         yield "sample.size", f"a sample of {size}² is larger than the picture ({listed(texture.size)})"
@@ -39,6 +41,11 @@ def texture_fits(scene: Scene) -> Faults:
         yield "paper.smallest", f"is above paper.largest, {scene.paper.largest}"
     if texture.maps and texture.method != "carry":
         yield "texture.maps", f'are of patches: there are none with method = "{texture.method}"'
+    if texture.loop and texture.method != "carry":
+        yield "texture.loop", f'is of patches: there are none with method = "{texture.method}"'
+    if texture.loop and scene.frames < SHORTEST * scene.carry.growth:
+        yield "frames", (f"a loop of {scene.frames} is too short: patches that grow for {scene.carry.growth} frames "
+                         f"(carry.growth) need {SHORTEST * scene.carry.growth}")
     if "holes" in scene.figure.panels and texture.method != "paper":
         yield "figure.panels", f'there are no "holes" with texture.method = "{texture.method}"'
     for number, moment in enumerate(scene.figure.moments):

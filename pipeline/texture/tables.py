@@ -33,6 +33,9 @@ class Texture(Table):
         "with method = \"carry\", write UV maps too, out/X/fields/uv.0001.exr …: for each pixel the places in the "
         "sample and the weights of its two strongest patches, for other programs", False)
     pace: float = key("speed, with speed = \"normalized\"", 1.5, "pixels per frame", gt=0, le=100)
+    loop: bool = key(
+        "with method = \"carry\", the last frame leads into the first: of a steady flow, or of one that repeats after "
+        "`frames`. No seams are repaired", False)
 
 
 class Carry(Table):

@@ -10,6 +10,7 @@ In the order data passes through them:
     paper       the paper's method: colours that are carried in cells (§2)
     patches     what patches of a sample cover and show, and which place of it continues a picture
     carry       ours: places in the sample that are carried in patches
+    loop        carry with lives of patches that repeat: the last frame leads into the first
     measures    how near a frame is to its sample, and how well it moves
 
 Notation:

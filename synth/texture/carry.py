@@ -377,7 +377,7 @@ class Synthesis:
         # 3. turn
         now = replace(state, frame=state.frame + 1, centre=centre, weight=weight.astype(np.float32),
                       age=state.age + np.int32(1), mask=_kept(ground))
-        now = replace(_chosen(now, stays), usage=self._used(state.usage, state.anchor[~stays], -1))
+        now = replace(chosen(now, stays), usage=self._used(state.usage, state.anchor[~stays], -1))
         turned: dict[str, Any] = self._turned(now.centre, ground)
         return replace(now, **turned)
 
@@ -688,7 +688,8 @@ def _open(state: State) -> np.ndarray | None:
     return state.mask if state.mask.size else None
 
 
-def _chosen(state: State, rows: np.ndarray) -> State:
+def chosen(state: State, rows: np.ndarray) -> State:
+    """The state with some of its patches: rows, an index or a mask."""
     return replace(state, **{name: getattr(state, name)[rows] for name in PATCHES})
 
 

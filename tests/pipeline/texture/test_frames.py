@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import tiny
 from scipy import ndimage
-from tiny import BY_PAPER, TEXTURE, Memory, changed, scene
+from tiny import BY_PAPER, LOOP, TEXTURE, Memory, changed, scene
 
 from pipeline.build.graph import computed
 from pipeline.texture.frames import velocity
@@ -57,6 +57,29 @@ def test_an_interrupted_run_goes_on_with_the_same_bits(tmp_path: Path, text: str
     kept = stopped.checkpoint.load(before=3)
     assert kept is not None and kept[0] in (1, 2)
     np.testing.assert_array_equal(dict(computed(frames, one, stopped, [3]))[3], whole[3])
+
+
+def test_any_frames_of_a_loop_are_those_of_the_whole(tmp_path: Path) -> None:
+    """A farm makes the frames of a loop in batches; each process finds the same patches."""
+    one, graph = scene(tmp_path, LOOP), tiny.made(tmp_path, LOOP, "synth")
+    frames = next(a for a in METHOD.artifacts(one) if a.name == "frames")
+    inputs = Memory(tmp_path, sample=graph.read("", "sample", 0), L=[graph.read("", "L", n) for n in range(1, 7)])
+    whole = dict(computed(frames, one, inputs, [1, 2, 3, 4, 5, 6]))
+    some = dict(computed(frames, one, inputs, [2, 5]))
+    assert list(some) == [2, 5]
+    for number, picture in some.items():
+        np.testing.assert_array_equal(picture, whole[number])
+    assert np.abs(some[5] - some[2]).mean() > 0.001
+
+
+def test_the_length_of_a_loop_is_in_its_key_alone(tmp_path: Path) -> None:
+    def made(text: str) -> str:
+        return str(tiny.graph(tmp_path, text).require("", "frames", 1).key)
+
+    tiny.made(tmp_path, LOOP, "synth")
+    loop = made(LOOP)
+    tiny.made(tmp_path, changed(LOOP, "frames = 6", "frames = 7"), "synth")
+    assert made(changed(LOOP, "frames = 6", "frames = 7")) != loop
 
 
 @pytest.mark.parametrize("text", [STONE, STONE.replace("size = [64, 48]", 'size = [64, 48]\nmethod = "paper"')],
