@@ -21,6 +21,7 @@ prints tables, writes each part's section of bench/RESULTS.md, and out/bench.jso
     elements     ma13: time, memory, growth, exemplars in their own domain, jitter
     fidelity     ma13: statistics of every scene beside those of its exemplar
     texture      wang05: likeness to the sample, motion, time, growth, memory, and rlic beside it
+    loops        wang05: how the last frame of a loop leads into the first
 
     targets      rows of each part: the measured number, its target, the paper's or a peer's number
     results      the rows as Markdown, in the part's own section of RESULTS.md

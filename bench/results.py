@@ -34,6 +34,7 @@ TITLES = {
     "elements": "ma13: time, memory, growth with the elements, fidelity, jitter",
     "fidelity": "ma13: statistics of every scene beside those of its exemplar",
     "texture": "wang05: how like their sample moving textures stay, how they move, time, memory",
+    "loops": "wang05: loops of 120 frames, 512² from 128²",
 }
 PARTS = tuple(TITLES)  # measured by `python -m bench PART`
 SECTIONS = (*PARTS, "figures", "earlier")  # the last two are written by hand

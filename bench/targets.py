@@ -215,6 +215,23 @@ def texture(found: dict[str, Any]) -> Iterable[Row]:
     yield from _texture_times(found, by_paper)
 
 
+def loops(found: dict[str, Any]) -> Iterable[Row]:
+    rows = found["loops"]
+
+    def worst(what: str, key: str, low: float, high: float, target: str) -> Row:
+        row = max(rows, key=lambda row: max(low - row[key], row[key] - high))
+        good = sum(low <= row[key] <= high for row in rows)
+        return Row(f"wang05, loops of {found['period']} frames: {what}",
+                   f"worst {row[key]:.3f} ({row['texture']}); {good} of {len(rows)} within", target,
+                   low <= row[key] <= high, NOT_REPORTED)
+
+    yield worst("last to first over the median of frame differences", "last to first", 0, 1.05, "≤ 1.05")
+    for key, name in (("std", "contrast"), ("grad", "gradient")):
+        yield worst(f"least {name} over the sample's", f"{key}, min", 0.85, 1.10, "0.85 to 1.10")
+        yield worst(f"largest {name} over the sample's", f"{key}, max", 0.85, 1.10, "0.85 to 1.10")
+    yield worst("histogram error", "hist, max", 0, 0.10, "≤ 0.10")
+
+
 def _look(whose: str, frames: list[dict[str, Any]], motion: list[dict[str, Any]]) -> Iterable[Row]:
     """What is asked of all textures alike: the worst of them against its target, and how many meet it."""
     def worst(rows: list[dict[str, Any]], what: str, keys: tuple[str, ...], low: float | None, high: float, unit: str,
@@ -266,4 +283,4 @@ def _texture_times(found: dict[str, Any], by_paper: dict[str, dict[str, Any]]) -
 ROWS: dict[str, Callable[[dict[str, Any]], Iterable[Row]]] = {
     "synthesis": synthesis, "search": search, "density": density, "repeat": repeat, "solid": solid, "smoke": smoke,
     "quality": quality, "boundary": boundary, "potential": potential, "lagrangian": lagrangian, "elements": elements,
-    "fidelity": fidelity, "texture": texture}
+    "fidelity": fidelity, "texture": texture, "loops": loops}

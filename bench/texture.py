@@ -34,7 +34,7 @@ SIZES = (256, 512, 1024, 2048)
 REFERENCED = 256  # edge of the picture that the reference draws
 SETTLING, TIMED, TURNS = 10, 9, 15  # frames before times are taken; frames and turns that are timed
 TAPS = 41
-BRICK = Path(__file__).parents[1] / "scenes/assets/brick.png"
+PHOTOGRAPHS = Path(__file__).parents[1] / "scenes/assets"
 METHODS: dict[str, Any] = {"carry": carry, "paper": paper}
 
 
@@ -189,7 +189,16 @@ def strokes() -> np.ndarray:
 
 def brick() -> np.ndarray:
     """The photograph of a brick wall."""
-    read = pictures.read(BRICK)
+    return _photograph("brick")
+
+
+def gravel() -> np.ndarray:
+    """The photograph of gravel, which has no direction."""
+    return _photograph("gravel")
+
+
+def _photograph(name: str) -> np.ndarray:
+    read = pictures.read(PHOTOGRAPHS / f"{name}.png")
     small = np.clip(pictures.resized(read, SAMPLE, SAMPLE), 0, 1)
     return tonemap.from_srgb(small)[::-1].astype(np.float32)
 
@@ -213,7 +222,9 @@ FIGURES: dict[str, tuple[Callable[[], np.ndarray], float | None, Callable[[int],
     "canes on circles": (procedural.canes, procedural.DIRECTION, circles, 300),
     "straw on vortices": (procedural.straw, procedural.DIRECTION, vortices, 300),
     "brick on waves": (brick, None, wavy, 300),
-    "scales on a saddle": (procedural.scales, procedural.DIRECTION, saddle, 100)}
+    "scales on a saddle": (procedural.scales, procedural.DIRECTION, saddle, 100),
+    "gravel on circles": (gravel, None, circles, 100),
+    "brick on circles": (brick, None, circles, 100)}
 """Sample, its direction, flow, and frames by `carry`; by `paper` there are BY_PAPER."""
 BY_PAPER = 100
 FOREIGN = {"beads": beads, "zigzag": zigzag, "rings": rings, "woven": woven, "arrows": arrows, "strokes": strokes}

@@ -171,6 +171,8 @@ class FileMotion(Motion):
         """L, world units per second: the field of the file in every frame."""
         steady = fields.read_user_field(self.file, "coarse.file", scene.dimension)
         size, cells = steady.shape[::-1], scene.cells
+        if not steady.values.any():
+            raise BadInput(self.file, "coarse.file", "is 0 everywhere")
         if not _alike(cells, size):
             raise BadInput(self.file, "coarse.file",
                            f"{listed(size)} has not the shape of {scene.cells_key}, {listed(cells)}")

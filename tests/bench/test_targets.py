@@ -11,6 +11,8 @@ LIKE = {"std": 0.98, "grad": 0.95, "hist": 0.04, "fwd": 0.22}
 MOVING = {"residual 50 %": 0.05, "residual 95 %": 0.09, "worst block": 0.5, "corr10": 0.995, "synthesised anew, %": 0.6,
           "drift of bwd": 0.01, "drift of used": 0.02, "wall ms": 20, "processor ms": 15}
 TEXTURES = ("canes on circles", "straw on vortices", "brick on waves")
+LOOP = {"last to first": 0.99, "std, min": 0.97, "std, max": 1.01, "grad, min": 0.9, "grad, max": 0.99,
+        "hist, max": 0.05}
 SECONDS = {"first frame, wall s": 0.4, "first frame, processor s": 0.3, "wall ms": 20, "processor ms": 15}
 DISTANCES = {"pair correlation": 0.05, "motion spectrum": None, "nearest distance": 0.02}
 FOUND: dict[str, dict[str, Any]] = {
@@ -58,6 +60,7 @@ FOUND: dict[str, dict[str, Any]] = {
                 "beside rlic": {"ours": TIMES, "rlic": TIMES, "ratio": {"wall": 0.4, "processor": 0.3}},
                 "against the reference": {"size": "256²", "ours": TIMES, "reference": TIMES,
                                           "largest difference": 0.0}},
+    "loops": {"period": 120, "loops": [{"texture": name, **LOOP} for name in TEXTURES]},
 }
 
 
@@ -83,6 +86,19 @@ def test_rows_of_good_numbers_miss_no_target(part: str) -> None:
 def test_a_worse_number_misses_its_target(part: str, key: str, value: Any, missed: str) -> None:
     rows = list(targets.ROWS[part](FOUND[part] | {key: value}))
     assert [row.measured for row in rows if row.verdict == "MISSED"] == [missed]
+
+
+@pytest.mark.parametrize(("key", "value", "what", "measured"), [
+    ("last to first", 1.06, "last to first", "worst 1.060 (brick on waves)"),
+    ("std, min", 0.84, "least contrast", "worst 0.840 (brick on waves)"),
+    ("grad, max", 1.12, "largest gradient", "worst 1.120 (brick on waves)"),
+    ("hist, max", 0.11, "histogram error", "worst 0.110 (brick on waves)")])
+def test_one_bad_loop_misses_one_target_and_is_named(key: str, value: float, what: str, measured: str) -> None:
+    rows = [row | {key: value} if row["texture"] == "brick on waves" else row for row in FOUND["loops"]["loops"]]
+    missed = [row for row in targets.loops(FOUND["loops"] | {"loops": rows}) if row.verdict == "MISSED"]
+    assert len(missed) == 1
+    assert what in missed[0].what
+    assert missed[0].measured.startswith(measured)
 
 
 def changed(table: str, texture: str, **numbers: float) -> dict[str, Any]:

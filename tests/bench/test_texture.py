@@ -7,9 +7,9 @@ from bench import texture
 from synth.texture.sample import sample
 
 
-@pytest.mark.parametrize("name", [*texture.FOREIGN, "brick"])
+@pytest.mark.parametrize("name", [*texture.FOREIGN, "brick", "gravel"])
 def test_every_sample_is_one_and_the_same_each_time(name: str) -> None:
-    made = {**texture.FOREIGN, "brick": texture.brick}[name]
+    made = {**texture.FOREIGN, "brick": texture.brick, "gravel": texture.gravel}[name]
     picture = made()
     assert picture.shape == (texture.SAMPLE, texture.SAMPLE, 3)
     assert picture.dtype == np.float32
@@ -48,7 +48,7 @@ def test_vortices_are_free_of_divergence_before_their_speed_is_made_one(monkeypa
 
 def test_every_figure_is_run_by_both_methods_and_foreign_samples_by_ours() -> None:
     assert len(texture.TEXTURES) == 2 * len(texture.FIGURES) + len(texture.FOREIGN) * len(texture.STRANGE)
-    assert [t.frames for name, t in texture.TEXTURES.items() if name.endswith("paper")] == [100] * 4
+    assert [t.frames for name, t in texture.TEXTURES.items() if name.endswith("paper")] == [100] * 6
     assert sum(t.frames == 300 and t.every == 1 for t in texture.TEXTURES.values()) == 3
 
 

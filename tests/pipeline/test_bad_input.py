@@ -150,6 +150,7 @@ def test_nan_and_infinity_in_a_field(home: Path, capsys: pytest.CaptureFixture[s
     ("a.vdb", Field.centred(np.ones((16, 16, 16), np.float32), 3), "no such grid"),
     ("a.exr", field(shape=(16, 24, 2)), "24×16 has not the shape of detail.size, 16×16"),
     ("a.exr", field(value=1e30), "cells per frame"),
+    ("a.exr", field(value=0.0), "a.exr: coarse.file: is 0 everywhere"),
 ])
 def test_a_coarse_motion_that_does_not_do(home: Path, capsys: pytest.CaptureFixture[str], name: str, made: Field,
                                           expected: str) -> None:
