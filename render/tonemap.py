@@ -36,8 +36,11 @@ def from_srgb(display: np.ndarray) -> np.ndarray:
 def to_display(light: np.ndarray, curve: Curve) -> np.ndarray:
     """Linear light (h, w, 3) as sRGB display values (h, w, 3) float32 in [0, 1].
 
-    "filmic" for rendered scenes; "straight", without a tone curve, for ink, whose paper must stay white.
+    "filmic" for rendered scenes; "straight", without a tone curve, for ink, whose paper must stay white. Light with
+    alpha (h, w, 4), by which its colours are multiplied, lies on white.
     """
+    if light.shape[-1] == 4:
+        light = light[..., :3] + (1 - light[..., 3:])
     return to_srgb(filmic(light) if curve == "filmic" else light).astype(np.float32)
 
 

@@ -15,6 +15,7 @@ from pipeline.build.artifact import Artifact, Inputs
 from pipeline.files import images
 from pipeline.files.format import Format
 from pipeline.flow import solid_input, upsampled, walls
+from pipeline.texture.samples import read_sample
 from pipeline.texture.tables import TextureScene
 
 READS = ("texture", "sample.direction", "seed", "fps", "shape")
@@ -31,11 +32,7 @@ def velocity(scene: TextureScene, inputs: Inputs, frame: int) -> np.ndarray:
 
 
 def _sample(scene: TextureScene, inputs: Inputs) -> Any:
-    from synth.texture.sample import sample
-
-    degrees = scene.sample.direction
-    return sample(np.ascontiguousarray(inputs.read("sample")[::-1]),
-                  direction=None if degrees is None else np.radians(degrees))
+    return read_sample(inputs.read("sample"), scene.sample.direction)
 
 
 def make_by_paper(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:

@@ -12,6 +12,13 @@ def test_srgb_values_of_the_standard() -> None:
     assert values == pytest.approx([0.0, 0.0, 0.0404482, 0.5, 1.0, 1.0], abs=2e-6)
 
 
+def test_light_with_alpha_lies_on_white() -> None:
+    """Its colours are multiplied by alpha: black that covers a half leaves half of the white."""
+    light = np.array([[[0.2, 0.1, 0.0, 1.0], [0.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]]])
+    shown = tonemap.from_srgb(tonemap.to_display(light, "straight"))
+    np.testing.assert_allclose(shown, [[[0.2, 0.1, 0.0], [0.5, 0.5, 0.5], [1.0, 1.0, 1.0]]], atol=1e-6)
+
+
 def test_filmic_never_decreases_and_leaves_room_above_one() -> None:
     curve = tonemap.filmic(np.linspace(0.0, 10.0, 2001))
     assert curve[0] == 0.0
