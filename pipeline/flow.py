@@ -17,7 +17,7 @@ from pydantic import Field, Strict
 from pipeline.build.artifact import Artifact, Inputs, Needs, Reads
 from pipeline.build.method import Faults
 from pipeline.errors import BadInput
-from pipeline.files import fields, meshes, netcdf, pictures, volumes
+from pipeline.files import fields, meshes, netcdf, pictures, video, volumes
 from pipeline.tables import Asset, Grid, Radius, SceneTables, Table, grid, key, listed
 from synth.field import Field as MotionField
 from synth.field import domain_origin
@@ -242,18 +242,58 @@ class NetcdfMotion(Motion):
         rms = np.sqrt(np.mean(np.sum(values[:, share >= 0.5].astype(np.float64) ** 2, axis=-1)))
         values *= np.float32(self.speed / max(rms, 1e-30))
         for frame in frames:
-            time = (frame - 1) / self.step
-            time = time % len(values) if self.cyclic else min(time, len(values) - 1)
-            before = int(time)
-            t, after = np.float32(time - before), (before + 1) % len(values)
-            field = MotionField.centred((1 - t) * values[before] + t * values[after], 2)
+            field = MotionField.centred(_between(values, (frame - 1) / self.step, self.cyclic), 2)
             if "solid" in inputs:
                 past = past_obstacles(scene, inputs, field.per_frame(scene.fps).values)
                 field = MotionField.centred(past, 2).per_second(scene.fps)
             yield frame, field
 
 
-Coarse = SmokeMotion | NoiseMotion | WakeMotion | AnalyticMotion | FileMotion | NetcdfMotion
+class ClipMotion(Motion):
+    """L is the optical flow of a clip: what moves there moves the scene."""
+
+    kind: Literal["clip"] = key("the motion in a clip")
+    file: Asset = key("a video; of its pictures the largest part of the domain's proportions is taken, in the middle, "
+                      "one height high")
+    size: Grid = grid("columns and rows of L", (64, 64))
+    scale: float = key("what the clip's speeds are multiplied by", 1.0, gt=0, le=1000)
+    step: float = key("time from a frame of the clip to the next; between them L is interpolated, after the last it "
+                      "stays", 1.0, "frames", gt=0, le=100000)
+    cyclic: bool = key("after the clip's last frame comes its first again", False)
+    smoothing: float = key("standard deviation of a Gaussian over time; 0: none", 1.0, "frames of the clip", ge=0,
+                           le=100)
+
+    def faults(self, scene: SceneInFlow) -> Faults:
+        if scene.dimension == 3:
+            yield "coarse.kind", f'"clip" is a flow of the plane; {scene.cells_key} is {listed(scene.cells)}'
+
+    def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
+        """L, world units per second."""
+        from synth.optical_flow import coarse_flow
+
+        grey = video.read_grey(self.file, "coarse.file")
+        try:
+            values = coarse_flow(grey, self.size[::-1], self.smoothing, self.cyclic)
+        except ValueError as error:
+            raise BadInput(self.file, "coarse.file", str(error)) from error
+        values *= np.float32(self.scale / self.step)
+        for frame in frames:
+            field = _between(values, (frame - 1) / self.step, self.cyclic)
+            if "solid" in inputs:
+                field = past_obstacles(scene, inputs, field)
+            yield frame, MotionField.centred(field, 2).per_second(scene.fps)
+
+
+def _between(values: np.ndarray, time: float, cyclic: bool) -> np.ndarray:
+    """Values (T, ...) at a time from 0, linear between two of them; after the last it stays, or the first follows."""
+    time = time % len(values) if cyclic else min(time, len(values) - 1)
+    before = int(time)
+    t, after = np.float32(time - before), (before + 1) % len(values)
+    between: np.ndarray = (1 - t) * values[before] + t * values[after]
+    return between
+
+
+Coarse = SmokeMotion | NoiseMotion | WakeMotion | AnalyticMotion | FileMotion | NetcdfMotion | ClipMotion
 
 
 # -- obstacles ----------------------------------------------------------------------------------------------------
