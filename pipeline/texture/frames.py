@@ -12,12 +12,16 @@ from typing import Any
 import numpy as np
 
 from pipeline.build.artifact import Artifact, Inputs
-from pipeline.files import images
+from pipeline.files import fields, images
 from pipeline.files.format import Format
-from pipeline.flow import solid_input, upsampled, walls
+from pipeline.flow import past_obstacles, solid_input, upsampled, walls
 from pipeline.texture.samples import read_sample
 from pipeline.texture.tables import TextureScene
+from synth.field import Field
 
+RESTS = 1e-3
+"""Share of its largest speed below which a flow rests: differences of pixels leave as much of a source of 10 pixels, to
+which texture.slowest would give a speed."""
 READS = ("texture", "sample.direction", "seed", "fps", "shape")
 
 
@@ -25,10 +29,28 @@ def velocity(scene: TextureScene, inputs: Inputs, frame: int) -> np.ndarray:
     """The velocity that the texture moves with (Y, X, 2), pixels per frame (§3)."""
     from synth.texture import flow
 
-    L, table = upsampled(inputs.read("L", frame), scene), scene.texture
+    L, table = upsampled(inputs.read("flow" if "flow" in inputs else "L", frame), scene), scene.texture
     if table.speed == "normalized":
         return flow.normalized(L, table.pace)
     return flow.limited(L, table.slowest, table.fastest)
+
+
+def make_flow(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, Field]]:
+    """The part of L that is free of divergence, on the pixels, world units per second.
+
+    Past walls, of a flow that changes, this is slow: 13 s a frame for the winds of wang05-wind (768 x 512).
+    """
+    before: tuple[np.ndarray, Field] | None = None
+    for frame in frames:
+        L = inputs.read("L", frame).per_frame(scene.fps).values
+        if before is None or not np.array_equal(before[0], L):  # a steady flow is projected once
+            free = past_obstacles(scene, inputs, L)
+            speed = np.hypot(free[..., 0], free[..., 1])
+            # both in pixels
+            largest = np.hypot(L[..., 0], L[..., 1]).max() * len(free) / len(L)
+            free[speed < RESTS * largest] = 0
+            before = L, Field.centred(free, 2).per_second(scene.fps)
+        yield frame, before[1]
 
 
 def _sample(scene: TextureScene, inputs: Inputs) -> Any:
@@ -115,7 +137,8 @@ def make_flow_picture(scene: TextureScene, inputs: Inputs, frames: list[int]) ->
     from render import lic, tonemap
 
     for frame in frames:
-        yield frame, tonemap.from_srgb(lic.picture(inputs.read("L", frame).values, scene.figure.panel, scene.seed))
+        v = inputs.read("flow" if "flow" in inputs else "L", frame).values
+        yield frame, tonemap.from_srgb(lic.picture(v, scene.figure.panel, scene.seed))
 
 
 def make_zoom(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
@@ -133,10 +156,13 @@ def make_zoom(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterato
 
 def frame_artifacts(scene: TextureScene) -> tuple[Artifact, ...]:
     """The frames; the holes and the flow where the figure shows them."""
-    needs: Any = (("sample", "once"), ("L", "until"), *solid_input(scene))
+    source = "flow" if scene.texture.divergence_free else "L"
+    needs: Any = (("sample", "once"), (source, "until"), *solid_input(scene))
     make, keys = {"carry": (make_by_carry, "carry"), "paper": (make_by_paper, "paper"),
                   "pixels": (make_by_pixels, "paper")}[scene.texture.method]
-    made = [Artifact("frames", "synth", images.LIGHT, (*READS, keys), needs, make)]
+    made = [Artifact("flow", "synth", fields.velocity(2, scene.fps), ("fps", "shape", "border"),
+                     (("L", "same"), *solid_input(scene)), make_flow)] if scene.texture.divergence_free else []
+    made.append(Artifact("frames", "synth", images.LIGHT, (*READS, keys), needs, make))
     if scene.texture.maps:
         made.append(Artifact("uv", "synth", MAPS, (*READS, "carry"), needs, make_maps, export=True))
     if "holes" in scene.figure.panels:
@@ -145,6 +171,6 @@ def frame_artifacts(scene: TextureScene) -> tuple[Artifact, ...]:
         made.append(Artifact("zoom", "render", images.LIGHT, ("figure.zoom", "figure.panel", "shape"),
                              (("frames", "same"),), make_zoom))
     if "flow" in scene.figure.panels:
-        made.append(Artifact("flow-lines", "render", images.LIGHT, ("figure.panel", "seed"), (("L", "same"),),
+        made.append(Artifact("flow-lines", "render", images.LIGHT, ("figure.panel", "seed"), ((source, "same"),),
                              make_flow_picture))
     return tuple(made)

@@ -29,6 +29,9 @@ class Texture(Table):
         "the flow's own, within slowest and fastest (§3), or the same everywhere (figures 8, 9 and 11)", "limited")
     slowest: float = key("least speed, with speed = \"limited\"", 0.3, "pixels per frame", ge=0, le=100)
     fastest: float = key("largest speed, with speed = \"limited\"", 2.2, "pixels per frame", gt=0, le=100)
+    divergence_free: bool = key(
+        "follow the coarse motion's part that is free of divergence (Helmholtz-Hodge), which goes round obstacles and "
+        "missing values: where a flow spreads or gathers, a texture is torn or crushed", False)
     maps: bool = key(
         "with method = \"carry\", write UV maps too, out/X/fields/uv.0001.exr …: for each pixel the places in the "
         "sample and the weights of its two strongest patches, for other programs", False)

@@ -9,9 +9,12 @@ from scipy import ndimage
 from tiny import BY_PAPER, TEXTURE, Memory, changed, scene
 
 from pipeline.build.graph import computed
+from pipeline.files import images
 from pipeline.texture.frames import velocity
 from pipeline.texture.method import METHOD
+from synth import obstacle
 from synth.field import Field
+from synth.projection import divergence
 
 STONE = TEXTURE + '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.2\n'
 
@@ -30,6 +33,74 @@ def test_the_speed_is_limited_or_the_same_everywhere(tmp_path: Path, keys: str, 
     v = velocity(one, Memory(tmp_path, L=L(speed)), 1)
     assert v.shape == (48, 64, 2)
     np.testing.assert_allclose(v, np.broadcast_to([expected, 0.0], v.shape), atol=1e-5)
+
+
+FREE = changed(TEXTURE, "size = [64, 48]", "size = [64, 48]\ndivergence_free = true")
+
+
+def free(folder: Path, v: np.ndarray, text: str = FREE, **files: Field) -> np.ndarray:
+    """The part free of divergence of v (Y, X, 2), pixels per frame."""
+    one = scene(folder, text)
+    flow = next(a for a in METHOD.artifacts(one) if a.name == "flow")
+    ((_, found),) = computed(flow, one, Memory(folder, L=Field.centred(v, 2).per_second(30), **files), [1])
+    return found.per_frame(30).values
+
+
+def places(times: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """x and y of the pixels from the middle, (48, 64) times `times` each, in heights."""
+    rows, columns = 48 * times, 64 * times
+    y, x = (np.mgrid[:rows, :columns] - np.array([rows - 1, columns - 1]).reshape(2, 1, 1) / 2) / rows
+    return x, y
+
+
+def test_of_a_pure_source_nothing_is_left_and_the_texture_rests(tmp_path: Path) -> None:
+    text = changed(FREE, "size = [64, 48]", "size = [192, 144]")
+    x, y = places(3)
+    source = (np.stack([x, y], -1) * 20 * np.exp(-(x * x + y * y) / (2 * 0.08**2))[..., None]).astype(np.float32)
+    assert np.hypot(*source.T).max() > 0.9
+    left = free(tmp_path, source, text)
+    assert left.shape == (144, 192, 2) and not left.any()
+    assert not velocity(scene(tmp_path, text), Memory(tmp_path, flow=Field.centred(left, 2)), 1).any()
+
+
+def test_a_rotation_is_free_of_divergence_already_and_unchanged(tmp_path: Path) -> None:
+    x, y = places()
+    rotation = (2 * np.stack([-y, x], -1)).astype(np.float32)
+    np.testing.assert_allclose(free(tmp_path, rotation), rotation, atol=2e-6)
+
+
+def test_what_is_left_has_no_divergence_and_goes_round_a_stone(tmp_path: Path) -> None:
+    v = np.random.default_rng(1).normal(size=(48, 64, 2)).astype(np.float32)
+    v = np.stack([ndimage.gaussian_filter(v[..., c], 4) for c in (0, 1)], -1) * 10
+    found = free(tmp_path, v)
+    rms = np.sqrt(np.mean(np.square(divergence(v, "open"))))
+    assert np.abs(divergence(found, "open")).max() < 1e-4 * rms and np.abs(found).mean() > 0.1 * np.abs(v).mean()
+    text = STONE.replace("size = [64, 48]", "size = [64, 48]\ndivergence_free = true")
+    distance = obstacle.ball((48, 64), (0, 0.5), 0.2).distance
+    found = free(tmp_path, v, text, solid=Field.centred(distance / 48, 2))
+    assert np.sqrt(np.mean(np.square(divergence(found, "open", distance)))) < 1e-3 * rms
+    wall = np.abs(distance) < 1
+    through = np.abs(np.sum(found * obstacle.outward(distance), -1))[wall].mean()
+    assert through < 0.35 * np.hypot(*found[wall].T).mean()
+
+
+def test_frames_and_lines_are_of_the_part_free_of_divergence(tmp_path: Path) -> None:
+    """A wind that gathers where it slows down: the frames that follow all of it are others."""
+    v = np.zeros((12, 16, 2), np.float32)
+    v[..., 0] = 2 - np.arange(16) / 8
+    images.write_field(tmp_path / "wind.exr", Field.centred(v, 2))
+    text = changed(TEXTURE, 'kind = "analytic"\nflow = "rotation"\nsize = [16, 12]', 'kind = "file"\nfile = "wind.exr"')
+    freed = changed(text, "size = [64, 48]", "size = [64, 48]\ndivergence_free = true")
+    pictures = []
+    for number, one in enumerate((text, freed)):
+        (tmp_path / str(number)).mkdir()
+        (tmp_path / str(number) / "wind.exr").write_bytes((tmp_path / "wind.exr").read_bytes())
+        graph = tiny.made(tmp_path / str(number), one)
+        pictures.append([graph.read("", name, 3) for name in ("frames", "flow-lines")])
+    (all_of_it, lines), (part, its_lines) = pictures
+    assert np.abs(all_of_it - part).mean() > 0.001 and np.abs(lines - its_lines).mean() > 0.001
+    named = {a.name: [name for name, _ in a.inputs] for a in METHOD.artifacts(scene(tmp_path, freed))}
+    assert named["flow"] == ["L"] and "L" not in named["frames"] + named["flow-lines"]
 
 
 @pytest.mark.parametrize("text", [TEXTURE, BY_PAPER], ids=["carry", "paper"])
