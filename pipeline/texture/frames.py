@@ -133,12 +133,14 @@ def _states(scene: TextureScene, inputs: Inputs, frames: list[int], method: Any,
 
 
 def make_flow_picture(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
-    """The lines of the flow."""
+    """The lines of the flow; solids and what has no values plain, with their outline."""
     from render import lic, tonemap
 
+    distance = walls(scene, inputs)
     for frame in frames:
         v = inputs.read("flow" if "flow" in inputs else "L", frame).values
-        yield frame, tonemap.from_srgb(lic.picture(v, scene.figure.panel, scene.seed))
+        picture = lic.picture(v, scene.figure.panel, scene.seed)
+        yield frame, tonemap.from_srgb(picture if distance is None else lic.with_solids(picture, distance))
 
 
 def make_zoom(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
@@ -171,6 +173,6 @@ def frame_artifacts(scene: TextureScene) -> tuple[Artifact, ...]:
         made.append(Artifact("zoom", "render", images.LIGHT, ("figure.zoom", "figure.panel", "shape"),
                              (("frames", "same"),), make_zoom))
     if "flow" in scene.figure.panels:
-        made.append(Artifact("flow-lines", "render", images.LIGHT, ("figure.panel", "seed"), ((source, "same"),),
-                             make_flow_picture))
+        made.append(Artifact("flow-lines", "render", images.LIGHT, ("figure.panel", "seed", "shape"),
+                             ((source, "same"), *solid_input(scene)), make_flow_picture))
     return tuple(made)

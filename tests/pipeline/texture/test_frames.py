@@ -12,6 +12,7 @@ from pipeline.build.graph import computed
 from pipeline.files import images
 from pipeline.texture.frames import velocity
 from pipeline.texture.method import METHOD
+from render import lic, tonemap
 from synth import obstacle
 from synth.field import Field
 from synth.projection import divergence
@@ -138,6 +139,15 @@ def test_there_is_no_texture_in_an_obstacle(tmp_path: Path, text: str) -> None:
         picture = graph.read("", "frames", frame)
         assert (picture[20:28, 28:36] == 0).all()
         assert picture[:, :12].mean() > 0.05
+
+
+def test_the_lines_of_the_flow_leave_an_obstacle_plain(tmp_path: Path) -> None:
+    graph = tiny.made(tmp_path, STONE.replace("panel = 32", "panel = 128"))
+    lines = tonemap.to_srgb(graph.read("", "flow-lines", 1))
+    y, x = np.mgrid[:96, :128] - np.array([47.5, 63.5]).reshape(2, 1, 1)
+    inside = np.hypot(x, y) < 0.2 * 96 - 3
+    np.testing.assert_allclose(lines[inside], lic.SOLID, atol=1e-3)
+    assert lines[np.hypot(x, y) > 0.2 * 96 + 3].std() > 0.1
 
 
 def test_the_other_methods_keys_change_nothing(tmp_path: Path) -> None:
