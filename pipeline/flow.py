@@ -200,14 +200,15 @@ class NetcdfMotion(Motion):
     size: Grid = grid("columns and rows of L", (64, 64))
     window: Annotated[tuple[Longitude, Latitude, Longitude, Latitude], Strict(False)] | None = key(
         "west, south, east, north, of which the domain shows the largest part of its proportions, a degree as long in "
-        "both directions; none: all there is", None, "degrees")
+        "both directions; on such a map what moves to the east is faster by 1 over the cosine of the latitude, from 85 "
+        "degrees on as there; none: all there is", None, "degrees")
     first: int = key("first time step, counted from 0", 0, ge=0, le=10**6)
     last: Annotated[int, Field(ge=0, le=10**6)] | None = key("last time step; none: the last there is", None)
     step: float = key("time from a time step to the next; between them L is interpolated, after the last it stays",
                       30.0, "frames", gt=0, le=100000)
     cyclic: bool = key("after the last time step comes the first again, as in a climatology", False)
-    speed: float = key("rms speed of all time steps, to which the file's is scaled", 0.1, "heights per second", gt=0,
-                       le=1000)
+    speed: float = key("rms speed of all time steps on the map, to which the file's is scaled", 0.1,
+                       "heights per second", gt=0, le=1000)
 
     def faults(self, scene: SceneInFlow) -> Faults:
         if scene.dimension == 3:
