@@ -139,6 +139,10 @@ class FigureTable(Table):
     webp: bool = key("make X.webp beside X.mp4: the same pictures as animated WebP that repeats without end, which web "
                      "pages show as a picture", False)
 
+    def shown(self, frames: int) -> list[int]:
+        """The frames of an animation of so many that the still shows, ascending."""
+        return [self.frame or frames]
+
 
 PROOF_WIDTH, PROOF_SAMPLES = 96, 8
 
