@@ -126,7 +126,8 @@ class Figure:
         if panel.inset:
             light = self._light(variant, panel.inset, panel.frame or frame)
             inset = layout.fitted(tonemap.to_display(light, panel.tone), round(INSET * panel.width))
-        return layout.Panel(picture, label, inset=inset, legend=lic.wheel(panel.width // 6) if panel.legend else None)
+        return layout.Panel(picture, label, inset=inset, legend=lic.wheel(panel.width // 6) if panel.legend else None,
+                            border=panel.border)
 
     def _light(self, variant: str, name: str, frame: int) -> np.ndarray:
         picture: np.ndarray = self.graph.read(variant, name, self.frame_of(variant, name, frame))

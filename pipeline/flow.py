@@ -8,7 +8,8 @@ place in `Coarse` or `Obstacle`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -59,6 +60,15 @@ class Motion(Table):
     def gaps(self, scene: SceneInFlow) -> list[obstacle.Obstacle]:
         """Where it has no values: one solid, or none if it has them everywhere."""
         return []
+
+    @property
+    def unit(self) -> str:
+        """The unit of `speeds`, as a legend says it."""
+        return "heights per second"
+
+    def speeds(self, L: Iterable[MotionField]) -> Iterator[np.ndarray]:
+        """Of each L, world units per second, the speed that a legend shows: (Y, X) or (Z, Y, X) float32."""
+        yield from (np.linalg.norm(one.values, axis=-1) for one in L)
 
     def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
         """L, world units per second. A simulation is run from its start: at its resolution that costs little."""
@@ -226,6 +236,25 @@ class NetcdfMotion(Motion):
             raise BadInput(self.file, "coarse.file", f"{self.u} and {self.v} are 0 wherever they have values")
         return found
 
+    def _per_unit(self, found: netcdf.Currents) -> float:
+        """Heights per second on the map, at the equator, for one of the file's unit."""
+        values, share = found.on(self.size[::-1])
+        rms = np.sqrt(np.mean(np.sum(values[:, share >= 0.5].astype(np.float64) ** 2, axis=-1)))
+        return float(self.speed / max(rms, 1e-30))
+
+    @property
+    def unit(self) -> str:
+        unit = self._read().unit or "the file's unit"
+        return re.sub(r"^(\w+)[ .]s(\^|\*\*)?-1$", r"\1/s", unit)
+
+    def speeds(self, L: Iterable[MotionField]) -> Iterator[np.ndarray]:
+        """The data's speeds, not those on the map, in the file's unit."""
+        found = self._read()
+        per_unit = np.float32(self._per_unit(found))
+        for one in L:
+            eastward = one.values[..., 0] * netcdf.shrunk(found.places(one.shape)[0])[:, None]
+            yield np.hypot(eastward, one.values[..., 1]) / per_unit
+
     def gaps(self, scene: SceneInFlow) -> list[obstacle.Obstacle]:
         from synth import obstacle
 
@@ -239,9 +268,8 @@ class NetcdfMotion(Motion):
 
     def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
         """L, world units per second."""
-        values, share = self._read().on(self.size[::-1])
-        rms = np.sqrt(np.mean(np.sum(values[:, share >= 0.5].astype(np.float64) ** 2, axis=-1)))
-        values *= np.float32(self.speed / max(rms, 1e-30))
+        found = self._read()
+        values = found.on(self.size[::-1])[0] * np.float32(self._per_unit(found))
         for frame in frames:
             field = MotionField.centred(_between(values, (frame - 1) / self.step, self.cyclic), 2)
             if "solid" in inputs:

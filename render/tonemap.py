@@ -62,12 +62,19 @@ def _triangular(shape: tuple[int, ...], seed: int) -> np.ndarray:
     return np.asarray(rng.random(shape, dtype=np.float32) - rng.random(shape, dtype=np.float32))
 
 
+_TO_CONES = np.array([[1.0, 0.3963377774, 0.2158037573],
+                      [1.0, -0.1055613458, -0.0638541728],
+                      [1.0, -0.0894841775, -1.2914855480]])
+_TO_RGB = np.array([[4.0767416621, -3.3077115913, 0.2309699292],
+                    [-1.2684380046, 2.6097574011, -0.3413193965],
+                    [-0.0041960863, -0.7034186147, 1.7076147010]])
+
+
 def oklab_to_linear(oklab: np.ndarray) -> np.ndarray:
     """Oklab (..., 3) (Ottosson 2020) as linear Rec.709, unclipped."""
-    to_cones = np.array([[1.0, 0.3963377774, 0.2158037573],
-                         [1.0, -0.1055613458, -0.0638541728],
-                         [1.0, -0.0894841775, -1.2914855480]])
-    to_rgb = np.array([[4.0767416621, -3.3077115913, 0.2309699292],
-                       [-1.2684380046, 2.6097574011, -0.3413193965],
-                       [-0.0041960863, -0.7034186147, 1.7076147010]])
-    return (oklab @ to_cones.T) ** 3 @ to_rgb.T
+    return (oklab @ _TO_CONES.T) ** 3 @ _TO_RGB.T
+
+
+def linear_to_oklab(linear: np.ndarray) -> np.ndarray:
+    """Linear Rec.709 (..., 3) as Oklab (..., 3), the inverse of `oklab_to_linear`: lightness, a and b, float64."""
+    return np.asarray(np.cbrt(linear @ np.linalg.inv(_TO_RGB).T) @ np.linalg.inv(_TO_CONES).T)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import ndimage
 
 from pipeline.build.artifact import Artifact, Inputs
 from pipeline.files import fields, images
@@ -143,6 +144,50 @@ def make_flow_picture(scene: TextureScene, inputs: Inputs, frames: list[int]) ->
         yield frame, tonemap.from_srgb(picture if distance is None else lic.with_solids(picture, distance))
 
 
+def make_speed(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, Field]]:
+    """The speed of L as it is, in the unit of its legend; where L has no values, that of the nearest place."""
+    distance = walls(scene, inputs)
+    for frame, speed in zip(frames, scene.coarse.speeds(inputs.read("L", n) for n in frames), strict=False):
+        if distance is not None:
+            rows, columns = ((np.arange(n) * 2 + 1) * pixels // (2 * n)
+                             for n, pixels in zip(speed.shape, distance.shape, strict=True))
+            unknown = (speed == 0) & (distance[np.ix_(rows, columns)] < len(distance) / len(speed))
+            nearest = ndimage.distance_transform_edt(unknown, return_distances=False, return_indices=True)
+            speed = speed[tuple(nearest)]
+        yield frame, Field.centred(speed.astype(np.float32), 2)
+
+
+def _range(inputs: Inputs, frames: int) -> tuple[float, float]:
+    """Least and greatest speed of all frames; a flow of one speed is the upper end of a range from 0."""
+    speeds = [inputs.read("speed", frame).values for frame in range(1, frames + 1)]
+    least, greatest = min(float(s.min()) for s in speeds), max(float(s.max()) for s in speeds)
+    return (least, greatest) if greatest - least > 1e-3 * greatest else (0.0, greatest or 1.0)
+
+
+def make_tinted(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The frames in the colours of their speed; solids and what has no values plain, with their outline."""
+    from render import lic, speed_map, tonemap
+
+    least, greatest = _range(inputs, scene.frames)
+    sample = inputs.read("sample")
+    shown = sample[..., :3][sample[..., 3] == 1] if sample.shape[2] == 4 else sample.reshape(-1, 3)
+    mean = float(tonemap.linear_to_oklab(np.maximum(shown, 0))[..., 0].mean())
+    distance = walls(scene, inputs)
+    for frame in frames:
+        speed = lic.resampled(inputs.read("speed", frame).values, *scene.shape)[::-1]
+        light = speed_map.tinted(inputs.read("frames", frame), (speed - least) / (greatest - least), mean)
+        yield frame, light if distance is None else tonemap.from_srgb(
+            lic.with_solids(tonemap.to_srgb(light), distance))
+
+
+def make_speed_legend(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The colours of the speeds of all frames, with their numbers and unit."""
+    from render import speed_map, tonemap
+
+    legend = speed_map.legend(*_range(inputs, scene.frames), scene.coarse.unit, scene.figure.panel)
+    yield 0, tonemap.from_srgb(legend)
+
+
 def make_zoom(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """A square of the frames, enlarged: each pixel is a block, so that nothing is smoothed (figure 7)."""
     x, y, edge = scene.figure.zoom or (0.5, 0.5, 1.0)
@@ -152,7 +197,7 @@ def make_zoom(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterato
     top = min(max(round(rows - y * columns - side / 2), 0), rows - side)
     block = max(1, scene.figure.panel // (2 * side))
     for frame in frames:
-        part = inputs.read("frames", frame)[top:top + side, left:left + side]
+        part = inputs.read("tinted" if "tinted" in inputs else "frames", frame)[top:top + side, left:left + side]
         yield frame, np.repeat(np.repeat(part, block, axis=0), block, axis=1)
 
 
@@ -169,9 +214,19 @@ def frame_artifacts(scene: TextureScene) -> tuple[Artifact, ...]:
         made.append(Artifact("uv", "synth", MAPS, (*READS, "carry"), needs, make_maps, export=True))
     if "holes" in scene.figure.panels:
         made.append(Artifact("holes", "synth", images.LIGHT, (*READS, "paper"), needs, make_holes))
+    result = "frames"
+    if scene.figure.overlay == "speed":
+        result = "tinted"
+        solid = solid_input(scene)
+        made += [
+            Artifact("speed", "synth", images.FIELD, ("coarse", "shape"), (("L", "same"), *solid), make_speed),
+            Artifact(result, "render", images.LIGHT, ("shape", "frames"),
+                     (("frames", "same"), ("speed", "every"), ("sample", "once"), *solid), make_tinted),
+            Artifact("speed-legend", "render", images.LIGHT, ("coarse", "figure.panel", "frames"),
+                     (("speed", "every"),), make_speed_legend, animated=False)]
     if scene.figure.zoom:
         made.append(Artifact("zoom", "render", images.LIGHT, ("figure.zoom", "figure.panel", "shape"),
-                             (("frames", "same"),), make_zoom))
+                             ((result, "same"),), make_zoom))
     if "flow" in scene.figure.panels:
         made.append(Artifact("flow-lines", "render", images.LIGHT, ("figure.panel", "seed", "shape"),
                              ((source, "same"), *solid_input(scene)), make_flow_picture))

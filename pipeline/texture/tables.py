@@ -99,9 +99,15 @@ class Figure(FigureTable):
     moments: Annotated[tuple[Annotated[int, Field(ge=1, le=100000)], ...], Strict(False)] = key(
         "frames at which the still shows the result (figure 8: 1, 30, 70, 100); none: figure.frame alone", (), "frames",
         max_length=16)
+    overlay: Literal["none", "speed"] = key(
+        "\"speed\": the result in colours that tell how fast L is, before texture.speed changes that; a "
+        "legend is the last panel", "none")
     zoom: Annotated[tuple[Share01, Share01, Share], Strict(False)] | None = key(
         "x and y of the middle and edge of a square of the result that is enlarged in its corner (figure 7); none: no "
         "such view", None, "widths of the picture")
+
+    def shown(self, frames: int) -> list[int]:
+        return sorted({*super().shown(frames), *self.moments})
 
 
 class TextureScene(SceneInFlow):

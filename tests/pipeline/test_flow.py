@@ -418,7 +418,7 @@ def test_what_goes_round_the_obstacles_by_itself_declares_no_border(coarse: str)
 # -- a wind on latitude and longitude -----------------------------------------------------------------------------
 
 
-def wind(land: bool = True, speed: float = 3) -> Path:
+def wind(land: bool = True, speed: float = 3, unit: str = "") -> Path:
     """wind.nc, 40 × 30 degrees: east wind, a moment later north wind; land in its north-east quarter."""
     latitude, longitude = np.arange(-14.5, 15), np.arange(-9.5, 30)
     u, v = np.zeros((2, 2, 30, 40), np.float32)
@@ -432,6 +432,7 @@ def wind(land: bool = True, speed: float = 3) -> Path:
         for name, field in (("u", u), ("v", v)):
             one = written.createVariable(name, "f4", ("time", "lat", "lon"))
             one[:] = field[:, ::-1]
+            one.units = unit
             one._FillValue = np.float32(-999)
     return Path("wind.nc")
 
@@ -467,6 +468,26 @@ def test_a_wind_is_interpolated_in_time_and_rests_on_land() -> None:
     meant = np.stack([-1.5 / shrunk, np.full(shrunk.shape, -3)], -1) * unit
     assert np.allclose(cyclic[4].values[~NORTH_EAST], meant[~NORTH_EAST], atol=1e-5)
     assert np.allclose(cyclic[5].values, found[1].values)
+
+
+@pytest.mark.parametrize(("said", "shown"), [
+    ("m s-1", "m/s"), ("m s**-1", "m/s"), ("km h-1", "km h-1"), ("knots", "knots"), ("", "the file's unit")])
+def test_speeds_of_a_wind_are_the_datas_in_its_unit(said: str, shown: str) -> None:
+    """Not those on the map, where what moves to the east is faster."""
+    wind(land=False, unit=said)
+    scene = netcdf_scene()
+    found = motion(scene, [1, 2, 3])
+    slow, between, fast = scene.coarse.speeds(found[n] for n in (1, 2, 3))
+    assert scene.coarse.unit == shown
+    assert np.allclose(slow, 3, rtol=1e-5) and np.allclose(fast, 6, rtol=1e-5)
+    assert np.allclose(between, np.hypot(1.5, 3), rtol=1e-5)
+
+
+def test_speeds_of_other_flows_are_in_heights_per_second() -> None:
+    scene = tiny.scene(Path(), tiny.TEXTURE)
+    L = motion(scene, [1])[1]
+    assert scene.coarse.unit == "heights per second"
+    np.testing.assert_allclose(next(scene.coarse.speeds([L])), np.hypot(L.values[..., 0], L.values[..., 1]), rtol=1e-6)
 
 
 def test_a_wind_without_gaps_has_no_walls_but_those_of_obstacles() -> None:

@@ -49,3 +49,11 @@ def test_oklab_white_is_white_and_red_is_red() -> None:
     """Ottosson 2020: (1, 0, 0) is white; Rec.709 red is (0.62796, 0.22486, 0.12585)."""
     colours = tonemap.oklab_to_linear(np.array([[1.0, 0.0, 0.0], [0.62796, 0.22486, 0.12585]]))
     assert colours == pytest.approx(np.array([[1.0, 1.0, 1.0], [1.0, 0.0, 0.0]]), abs=1e-3)
+
+
+def test_oklab_there_and_back_and_its_known_values() -> None:
+    """White is 1, 0, 0; red is as Ottosson gives it."""
+    light = np.random.default_rng(1).random((50, 3))
+    np.testing.assert_allclose(tonemap.oklab_to_linear(tonemap.linear_to_oklab(light)), light, atol=1e-7)
+    np.testing.assert_allclose(tonemap.linear_to_oklab(np.array([[1.0, 1, 1], [1, 0, 0]])),
+                               [[1, 0, 0], [0.628, 0.225, 0.126]], atol=1e-3)

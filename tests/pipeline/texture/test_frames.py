@@ -12,7 +12,7 @@ from pipeline.build.graph import computed
 from pipeline.files import images
 from pipeline.texture.frames import velocity
 from pipeline.texture.method import METHOD
-from render import lic, tonemap
+from render import lic, speed_map, tonemap
 from synth import obstacle
 from synth.field import Field
 from synth.projection import divergence
@@ -148,6 +148,66 @@ def test_the_lines_of_the_flow_leave_an_obstacle_plain(tmp_path: Path) -> None:
     inside = np.hypot(x, y) < 0.2 * 96 - 3
     np.testing.assert_allclose(lines[inside], lic.SOLID, atol=1e-3)
     assert lines[np.hypot(x, y) > 0.2 * 96 + 3].std() > 0.1
+
+
+TINTED = changed(TEXTURE, "panel = 32", 'panel = 32\noverlay = "speed"')
+
+
+def test_the_overlay_shows_the_speed_of_the_flow_itself_and_not_that_of_the_texture(tmp_path: Path) -> None:
+    """A rotation: slow in the middle, fast at the corners, though the texture has one speed everywhere."""
+    graph = tiny.made(tmp_path, changed(TINTED, "size = [64, 48]", 'size = [64, 48]\nspeed = "normalized"'))
+    L, speed = graph.read("", "L", 2), graph.read("", "speed", 2)
+    np.testing.assert_allclose(speed.values, np.hypot(L.values[..., 0], L.values[..., 1]), rtol=1e-6)
+    lab = tonemap.linear_to_oklab(graph.read("", "tinted", 2))
+    x, y = places()
+    away = np.hypot(x, y)
+    inner, outer = lab[away < 0.1].mean(0), lab[(away > 0.5) & (away < 0.7)].mean(0)
+    least, greatest = speed.values.min(), speed.values.max()
+    for found, where in ((inner, away < 0.1), ((outer), (away > 0.5) & (away < 0.7))):
+        share = (lic.resampled(speed.values, 48, 64)[where].mean() - least) / (greatest - least)
+        assert np.abs(found - speed_map.colours(share)).max() < 0.06
+    assert outer[0] - inner[0] > 0.2
+    frame = tonemap.linear_to_oklab(graph.read("", "frames", 2))[..., 0]
+    near = away < 0.15
+    assert np.corrcoef(lab[near][:, 0], frame[near])[0, 1] > 0.8
+
+
+def test_an_obstacle_is_plain_in_the_overlay_and_the_speed_beside_land_is_that_of_the_sea(tmp_path: Path) -> None:
+    stone = changed(STONE, "panel = 32", 'panel = 32\noverlay = "speed"')
+    graph = tiny.made(tmp_path, stone)
+    shown = tonemap.to_srgb(graph.read("", "tinted", 3))
+    x, y = places()
+    np.testing.assert_allclose(shown[np.hypot(x, y) < 0.13], lic.SOLID, atol=1e-3)
+    one = scene(tmp_path, stone)
+    values = np.zeros((12, 16, 2), np.float32)
+    values[:, :8, 0] = 3  # no values on land, the right half
+    sea = Field.centred((31.5 - np.arange(64)) / 48 * np.ones((48, 1)), 2)
+    speed = next(a for a in METHOD.artifacts(one) if a.name == "speed")
+    ((_, found),) = computed(speed, one, Memory(tmp_path, L=Field.centred(values, 2), solid=sea), [1])
+    np.testing.assert_allclose(found.values, 3)
+
+
+def test_the_legend_is_of_all_frames_and_a_flow_of_one_speed_has_one_too(tmp_path: Path) -> None:
+    graph = tiny.made(tmp_path, changed(TINTED, '"rotation"', '"constant"'))
+    legend = graph.read("", "speed-legend", 0)
+    speed = float(graph.read("", "speed", 1).values.max())
+    meant = speed_map.legend(0.0, speed, "heights per second", 32)
+    np.testing.assert_allclose(tonemap.to_srgb(legend), meant, atol=1e-3)
+    noise = changed(TINTED, 'kind = "analytic"\nflow = "rotation"', 'kind = "curl-noise"\nperiod = 2')
+    graph = tiny.made(tmp_path, noise)
+    speeds = [graph.read("", "speed", n).values for n in (1, 2, 3)]
+    greatest = [float(s.max()) for s in speeds]
+    assert greatest[0] != greatest[2]
+    meant = speed_map.legend(min(float(s.min()) for s in speeds), max(greatest), "heights per second", 32)
+    np.testing.assert_allclose(tonemap.to_srgb(graph.read("", "speed-legend", 0)), meant, atol=1e-3)
+
+
+def test_moments_are_rendered_where_there_is_no_animation(tmp_path: Path) -> None:
+    text = changed(TINTED, "panel = 32", "panel = 32\nmoments = [1, 2]\nzoom = [0.5, 0.5, 0.5]\nanimation = false")
+    graph = tiny.made(tmp_path, text)
+    assert (graph.root / "tiny.png").is_file() and not (graph.root / "tiny.mp4").exists()
+    assert sorted(file.name for file in (graph.root / "images").glob("zoom.*")) == [
+        f"zoom.{n:04d}.exr" for n in (1, 2, 3)]
 
 
 def test_the_other_methods_keys_change_nothing(tmp_path: Path) -> None:
