@@ -61,6 +61,9 @@ class Motion(Table):
         """Where it has no values: one solid, or none if it has them everywhere."""
         return []
 
+    def check(self, scene: SceneInFlow) -> None:
+        """Refuse a file that cannot be used: raises BadInput."""
+
     @property
     def unit(self) -> str:
         """The unit of `speeds`, as a legend says it."""
@@ -177,14 +180,21 @@ class FileMotion(Motion):
     file: Asset = key("EXR (channels x, y) or VDB (grid vel; its middle slice, in 3-D all of it), heights per second; "
                       "it fills the domain, wherever it lies and whatever its voxels")
 
-    def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
-        """L, world units per second: the field of the file in every frame."""
-        steady = fields.read_user_field(self.file, "coarse.file", scene.dimension)
-        size, cells = steady.shape[::-1], scene.cells
+    def check(self, scene: SceneInFlow) -> None:
+        self._read(scene)
+
+    def _read(self, scene: SceneInFlow) -> MotionField:
+        """The field of the file, world units per second."""
+        read = fields.read_user_field(self.file, "coarse.file", scene.dimension)
+        size, cells = read.shape[::-1], scene.cells
         if not _alike(cells, size):
             raise BadInput(self.file, "coarse.file",
                            f"{listed(size)} has not the shape of {scene.cells_key}, {listed(cells)}")
-        steady = MotionField.centred(steady.values, scene.dimension)
+        return MotionField.centred(read.values, scene.dimension)
+
+    def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
+        """L, world units per second: the field of the file in every frame."""
+        steady = self._read(scene)
         if "solid" in inputs:
             values = past_obstacles(scene, inputs, steady.per_frame(scene.fps).values)
             steady = MotionField.centred(values, scene.dimension).per_second(scene.fps)
@@ -229,6 +239,9 @@ class NetcdfMotion(Motion):
             yield "coarse.window", "has its south not below its north"
         if self.window and self.window[2] - self.window[0] > 360:
             yield "coarse.window", "is wider than the globe"
+
+    def check(self, scene: SceneInFlow) -> None:
+        self._read()
 
     def _read(self) -> netcdf.Currents:
         found = netcdf.read_foreign(self.file, "coarse", self.u, self.v, self.first, self.last, self.window)
@@ -296,16 +309,22 @@ class ClipMotion(Motion):
         if scene.dimension == 3:
             yield "coarse.kind", f'"clip" is a flow of the plane; {scene.cells_key} is {listed(scene.cells)}'
 
-    def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
-        """L, world units per second."""
+    def check(self, scene: SceneInFlow) -> None:
+        self._read()
+
+    def _read(self) -> np.ndarray:
+        """The clip's motion (N - 1, Y, X, 2), cells of L per frame of the clip."""
         from synth.optical_flow import coarse_flow
 
         grey = video.read_grey(self.file, "coarse.file")
         try:
-            values = coarse_flow(grey, self.size[::-1], self.smoothing, self.cyclic)
+            return coarse_flow(grey, self.size[::-1], self.smoothing, self.cyclic)
         except ValueError as error:
             raise BadInput(self.file, "coarse.file", str(error)) from error
-        values *= np.float32(self.scale / self.step)
+
+    def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
+        """L, world units per second."""
+        values = self._read() * np.float32(self.scale / self.step)
         for frame in frames:
             field = _between(values, (frame - 1) / self.step, self.cyclic)
             if "solid" in inputs:
@@ -530,5 +549,7 @@ def coarse_artifact(scene: SceneInFlow) -> Artifact:
     """L."""
     past = ("shape", "border") if scene.obstacles and not scene.coarse.passes_obstacles else ()
     reads = ("coarse", "seed", "fps", "dimension", *scene.coarse.reads, *past)
-    return Artifact("L", "synth", fields.velocity(scene.dimension, scene.fps), reads,
-                    solid_input(scene) if scene.obstacles else (), scene.coarse.make)
+    # without solids its first frame is tried before anything is made, with them only its file can be
+    inputs, check = (solid_input(scene), scene.coarse.check) if scene.obstacles else ((), None)
+    return Artifact("L", "synth", fields.velocity(scene.dimension, scene.fps), reads, inputs, scene.coarse.make,
+                    check=check)

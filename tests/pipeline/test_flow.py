@@ -645,3 +645,16 @@ def test_a_clip_is_of_the_plane() -> None:
     text = tiny.changed(tiny.SPACE, 'kind = "analytic"\nflow = "constant"', 'kind = "clip"\nfile = "clip.mp4"')
     assert tiny.complaint(tiny.written(Path(), text)) == (
         'coarse.kind: "clip" is a flow of the plane; detail.size is 16×8×16')
+
+
+@pytest.mark.parametrize("coarse", ['kind = "clip"\nfile = "a.mp4"\nsize = [16, 12]', 'kind = "file"\nfile = "a.exr"',
+                                    'kind = "netcdf"\nfile = "a.nc"\nsize = [16, 12]'])
+def test_a_file_of_a_motion_past_an_obstacle_is_read_before_anything_is_written(
+        capsys: pytest.CaptureFixture[str], coarse: str) -> None:
+    for name in ("a.mp4", "a.exr", "a.nc"):
+        Path(name).write_text("no such thing")
+    text = tiny.changed(tiny.TEXTURE, 'kind = "analytic"\nflow = "rotation"\nsize = [16, 12]', coarse)
+    Path("tiny.toml").write_text(tiny.changed(text, "[texture]", f"{BALL}\n[texture]"))
+    assert cli.run(["figure", "tiny.toml"]) == 2
+    line = capsys.readouterr().err
+    assert "coarse.file: " in line and line.count("\n") == 1 and not Path("out").exists()
