@@ -15,6 +15,7 @@ from pipeline.files import atomic, sandbox
 from pipeline.files.pictures import LUMA, as_bytes
 
 MOST_FRAMES = 1000  # of a user's clip
+MILLISECOND = Fraction(1, 1000)  # WebP's unit of time
 WEBP_QUALITY = 90  # of 100: no blocks are seen at full size
 _FORMAT = {"movflags": "+faststart", "fflags": "+bitexact"}
 # mbtree: x264's AVX-512 code for it reads beside its rows, and makes other bytes from run to run
@@ -37,10 +38,11 @@ def write(path: Path, frames: Iterable[np.ndarray], fps: float, *, crf: int = 16
 def write_webp(path: Path, frames: Iterable[np.ndarray], fps: float) -> int:
     """Encode the same pictures as animated WebP that repeats without end; returns how many there were.
 
-    Lossy, at a quality that looks clean; of any size up to 16383 pixels a side. A frame's time is right within a
-    millisecond, the format's unit. A picture that is the one before it lets that stand longer; if all are one, the file
-    is a still. One thread: the same frames give the same bytes. Raises ValueError for no frame or another size,
-    `StorageFailed` if libwebp refuses or the disk is full.
+    Lossy, at a quality that looks clean; of any size up to 16383 pixels a side. A frame begins within half a
+    millisecond of its time, the format's unit being one; the last stands as long as the others do on the whole. A
+    picture that is the one before it lets that stand longer; if all are one, the file is a still. One thread: the same
+    frames give the same bytes. Raises ValueError for no frame or another size, `StorageFailed` if libwebp refuses or
+    the disk is full.
     """
     rate = _rate(fps)
     return _written(path, frames, "WebP", lambda file, pictures, shape: _encode_webp(file, pictures, shape, rate),
@@ -124,15 +126,19 @@ def _encode_webp(path: Path, pictures: Iterable[np.ndarray], shape: tuple[int, .
         stream.pix_fmt = "bgra"
         stream.height, stream.width, _ = shape
         stream.thread_count = 1
+        stream.codec_context.time_base = MILLISECOND
         for picture in _alike(pictures, shape):
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="bgra")
+            start, end = (round(1000 * (count + shown) / rate) for shown in (0, 1))
+            frame.time_base, frame.pts, frame.duration = MILLISECOND, start, end - start
+            container.mux(stream.encode(frame))
             count += 1
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="bgra")))
         container.mux(stream.encode())
     return count
 
 
 def _stands(path: Path, seconds: Fraction) -> bool:
-    """Whether a WebP is whole, and its frames together stand so long; a still stands as long as one likes.
+    """Whether a WebP is whole, and its frames together stand so long, within 2 ms; a still, as long as one likes.
 
     Read chunk by chunk (RIFF), since FFmpeg does not decode animated WebP.
     """
@@ -145,7 +151,7 @@ def _stands(path: Path, seconds: Fraction) -> bool:
         if content[at:at + 4] == b"ANMF":
             times.append(int.from_bytes(content[at + 20:at + 23], "little"))
         at += 8 + size + size % 2
-    return at == len(content) and (not times or abs(sum(times) - 1000 * seconds) <= 1)
+    return at == len(content) and (not times or abs(sum(times) - 1000 * seconds) <= 2)
 
 
 def _frames(path: Path) -> dict[str, Any]:

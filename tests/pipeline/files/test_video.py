@@ -58,7 +58,8 @@ def test_a_webp_repeats_the_pictures_without_end_each_in_its_time(tmp_path: Path
     read, shown = cv2.imreadanimation(str(tmp_path / "a.webp"))
     assert read and shown.loop_count == 0 and len(shown.frames) == 7
     ends = np.cumsum(shown.durations)
-    np.testing.assert_allclose(ends, np.arange(1, 8) * 1000 / fps, atol=1.0)
+    np.testing.assert_allclose(ends[:-1], np.arange(1, 7) * 1000 / fps, atol=0.51)
+    assert abs(ends[-1] - 7000 / fps) < 1.6  # libwebp takes the mean of the others for the last
     for seen, meant in zip(shown.frames, frames(7), strict=True):
         seen = seen[..., 2::-1] / 255
         assert seen.shape == meant.shape == (66, 97, 3)
@@ -87,7 +88,7 @@ def test_the_same_frames_are_the_same_bytes_of_webp(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", [lambda b: b[:-2], lambda b: b[:len(b) // 2], lambda b: b + b"\0\0",
-                                    lambda b: b"", lambda b: b[:-700].replace(b"ANMF", b"XXXX", 1) + b[-700:]])
+                                    lambda b: b"", lambda b: b.replace(b"ANMF", b"XXXX", 1)])
 def test_a_webp_that_does_not_read_back_whole_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                                              damage: Callable[[bytes], bytes]) -> None:
     encode = video._encode_webp
