@@ -155,9 +155,12 @@ BY_PAPER = changed(TEXTURE, "size = [64, 48]", 'size = [64, 48]\nmethod = "paper
     '"flow", "result"', '"holes", "result"').replace("panel = 32", "panel = 32\nmoments = [1, 3]")
 LOOP = changed(changed(TEXTURE, "frames = 3", "frames = 6"), "size = [64, 48]",
                "size = [64, 48]\nloop = true\n[carry]\ngrowth = 2")
+TINTED = changed(changed(TEXTURE, "size = [64, 48]", "size = [64, 48]\ndivergence_free = true"), "panel = 32",
+                 'panel = 32\noverlay = "speed"\nwebp = true')
 SCENES = {"smoke": SMOKE, "river": RIVER, "volume": VOLUME, "space": SPACE, "potential": POTENTIAL,
           "lagrangian": LAGRANGIAN, "beads": BEADS, "fish": FISH, "noodles": NOODLES, "paper": PAPER,
-          "texture": TEXTURE, "texture by the paper": BY_PAPER, "texture that loops": LOOP}
+          "texture": TEXTURE, "texture by the paper": BY_PAPER, "texture of true speed": TINTED,
+          "texture that loops": LOOP}
 """Scenes that together have every stage, every look and every way to synthesize."""
 
 

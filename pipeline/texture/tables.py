@@ -29,6 +29,9 @@ class Texture(Table):
         "the flow's own, within slowest and fastest (§3), or the same everywhere (figures 8, 9 and 11)", "limited")
     slowest: float = key("least speed, with speed = \"limited\"", 0.3, "pixels per frame", ge=0, le=100)
     fastest: float = key("largest speed, with speed = \"limited\"", 2.2, "pixels per frame", gt=0, le=100)
+    divergence_free: bool = key(
+        "follow the coarse motion's part that is free of divergence (Helmholtz-Hodge), which goes round obstacles and "
+        "missing values: where a flow spreads or gathers, a texture is torn or crushed", False)
     maps: bool = key(
         "with method = \"carry\", write UV maps too, out/X/fields/uv.0001.exr …: for each pixel the places in the "
         "sample and the weights of its two strongest patches, for other programs", False)
@@ -99,9 +102,15 @@ class Figure(FigureTable):
     moments: Annotated[tuple[Annotated[int, Field(ge=1, le=100000)], ...], Strict(False)] = key(
         "frames at which the still shows the result (figure 8: 1, 30, 70, 100); none: figure.frame alone", (), "frames",
         max_length=16)
+    overlay: Literal["none", "speed"] = key(
+        "\"speed\": the result in colours that tell how fast L is, before texture.speed changes that; a "
+        "legend is the last panel", "none")
     zoom: Annotated[tuple[Share01, Share01, Share], Strict(False)] | None = key(
         "x and y of the middle and edge of a square of the result that is enlarged in its corner (figure 7); none: no "
         "such view", None, "widths of the picture")
+
+    def shown(self, frames: int) -> list[int]:
+        return sorted({*super().shown(frames), *self.moments})
 
 
 class TextureScene(SceneInFlow):
