@@ -49,7 +49,7 @@ class Carry(Table):
         "least and largest radius of a patch; where the flow bends more it is smaller", (6.0, 20.0), "pixels")
     elongation: float = key("length of a patch along the flow over its width", 1.5, ge=1, le=4)
     usage: float = key("how strongly places of the sample that are in use are avoided; 0: not at all", 0.6, ge=0, le=10)
-    growth: int = key("frames in which a new patch grows", 8, "frames", ge=1, le=1000)
+    growth: int = key("frames in which a new patch grows", 12, "frames", ge=1, le=1000)
     blend: Annotated[float, Field(ge=0, le=1)] | Literal["auto"] = key(
         "share of the blend that keeps the variance; \"auto\": so that the first frame has the sample's contrast",
         "auto")

@@ -36,7 +36,7 @@ from synth.texture.sample import Sample
 
 TILE = 16
 FINE = 3
-"""The sample is enlarged so many times, by cubic interpolation, and then read by linear interpolation."""
+"""The sample is enlarged so many times, by a cubic spline, and then read by linear interpolation."""
 FX, FY, TX, TY, BEND_T, BEND_N, AX, AY, INVERSE, STEEP, BIAS, BEFORE, RADIUS, NEAR = range(14)
 """What the floats of a patch's table are; the kernels know them by the same names."""
 FIELDS = 16
@@ -422,22 +422,25 @@ def _uploaded(arrays: Table | Lists | Query) -> tuple[Any, ...]:
 
 
 def enlarged(picture: np.ndarray) -> np.ndarray:
-    """picture (H, W, C) with FINE places a pixel: (FINE (H - 1) + 1, FINE (W - 1) + 1, C) float32, Catmull-Rom.
+    """picture (H, W, C) with FINE places a pixel: (FINE (H - 1) + 1, FINE (W - 1) + 1, C) float32, by the cubic spline
+    through its pixels, mirrored at its edges as `draw` mirrors it.
 
-    Every FINE-th place is a pixel of the picture; none is outside the picture's range.
+    Every FINE-th place is a pixel of the picture; none is outside the picture's range. A spline keeps fine detail alike
+    at all places between pixels; Catmull-Rom blurs it there, and a moving patch then flickers between sharp and soft.
     """
     values = picture.astype(np.float64)
     for axis in (0, 1):
         values = np.moveaxis(values, axis, 0)
-        padded = np.concatenate([values[:1], values, values[-1:]])
         n = len(values)
         fine = np.empty((FINE * (n - 1) + 1, *values.shape[1:]))
         fine[::FINE] = values
-        for k in range(1, FINE):
-            f = k / FINE
-            weights = (f * (-1 + f * (2 - f)) / 2, (2 + f * f * (3 * f - 5)) / 2, f * (1 + f * (4 - 3 * f)) / 2,
-                       f * f * (f - 1) / 2)
-            fine[k::FINE] = sum(w * padded[i:i + n - 1] for i, w in enumerate(weights))
+        if n > 1:
+            spline = ndimage.spline_filter1d(values, axis=0, mode="mirror")
+            padded = np.concatenate([spline[1:2], spline, spline[-2:-1]])
+            for k in range(1, FINE):
+                f = k / FINE
+                weights = ((1 - f)**3 / 6, (4 - 6 * f * f + 3 * f**3) / 6, (1 + 3 * f * (1 + f - f * f)) / 6, f**3 / 6)
+                fine[k::FINE] = sum(w * padded[i:i + n - 1] for i, w in enumerate(weights))
         values = np.moveaxis(fine, 0, axis)
     low, high = picture.min(axis=(0, 1)), picture.max(axis=(0, 1))
     return np.ascontiguousarray(np.clip(values, low, high), np.float32)
