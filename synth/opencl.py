@@ -65,7 +65,8 @@ class Program:
         import pyopencl as cl
 
         options = [f"-D{name}={value}" for name, value in sorted(defines.items())]
-        options.append("-cl-std=CL1.2")
+        # -w: on a processor without AVX-512 PoCL warns at every vector of 16, each time a kernel is compiled
+        options += ["-cl-std=CL1.2", "-w"]
         self._program = cl.Program(_queue().context, with_includes(source)).build(options)
         self._kernels: dict[str, Any] = {}
 
