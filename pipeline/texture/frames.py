@@ -5,7 +5,7 @@ All are pictures in linear light, top row first; synth.texture has the lowest ro
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from pipeline.build.artifact import Artifact, Inputs
 from pipeline.files import images
 from pipeline.files.format import Format
 from pipeline.flow import solid_input, upsampled, walls
+from pipeline.texture.surfaces import pixel, read_back
 from pipeline.texture.tables import TextureScene
 
 READS = ("texture", "sample.direction", "seed", "fps", "shape")
@@ -62,6 +63,22 @@ def make_maps(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterato
         scene, inputs, frames, carry, scene.carry.settings()))
 
 
+def make_on_surface(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The frames on a surface: the texture of all its triangles, each where `surface` has it."""
+    from synth.texture import shapes, surface
+    from synth.texture.atlas import Atlas
+
+    mesh, field, uv = read_back(inputs.read("surface"))
+    rows, columns = scene.shape
+    table, scale = scene.texture, pixel(scene, mesh.vertices)
+    least, most = (table.pace,) * 2 if table.speed == "normalized" else (table.slowest, table.fastest)
+    v = shapes.paced(field, least * scale, most * scale)
+    synthesis = surface.Synthesis(_sample(scene, inputs), mesh, scene.carry.settings(), scene.seed, scale)
+    texels = Atlas.of_uv(uv, (rows, columns)).texels()
+    for frame, state in _resumed(inputs, frames, surface.State, lambda _, before: synthesis.frame(v, before)):
+        yield frame, synthesis.picture(state, v, texels, (rows, columns))[::-1]
+
+
 def write_maps(file: Path, maps: np.ndarray) -> None:
     """Write UV maps as an EXR of CHANNELS."""
     images.write(file, {name: maps[..., n] for n, name in enumerate(CHANNELS)})
@@ -99,16 +116,27 @@ def make_holes(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterat
 
 def _states(scene: TextureScene, inputs: Inputs, frames: list[int], method: Any, settings: Any,
             ) -> Iterator[tuple[int, Any, Any]]:
-    """(frame, synthesis, state) of each of `frames`. An interrupted run goes on from the last state: same bits."""
+    """(frame, synthesis, state) of each of `frames`."""
     synthesis = method.Synthesis(_sample(scene, inputs), scene.shape, settings, scene.seed)
     distance = walls(scene, inputs)
     mask = None if distance is None else distance > 0
+
+    def after(frame: int, before: Any) -> Any:
+        return synthesis.frame(velocity(scene, inputs, frame), before, mask)
+
+    yield from ((frame, synthesis, state) for frame, state in _resumed(inputs, frames, method.State, after))
+
+
+def _resumed(inputs: Inputs, frames: list[int], kind: Any, after: Callable[[int, Any], Any],
+             ) -> Iterator[tuple[int, Any]]:
+    """(frame, state) of each of `frames`, where `after` gives the state of a frame by that before it. An interrupted
+    run goes on from the last state: same bits."""
     kept = inputs.checkpoint.load(before=frames[0])
-    done, state = (kept[0], method.State.of(kept[1])) if kept else (0, None)
+    done, state = (kept[0], kind.of(kept[1])) if kept else (0, None)
     for frame in range(done + 1, frames[-1] + 1):
-        state = synthesis.frame(velocity(scene, inputs, frame), state, mask)
+        state = after(frame, state)
         if frame in frames:
-            yield frame, synthesis, state
+            yield frame, state
         if frame < frames[-1]:
             inputs.checkpoint.save(frame, state.arrays())
 
@@ -136,6 +164,9 @@ def make_zoom(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterato
 
 def frame_artifacts(scene: TextureScene) -> tuple[Artifact, ...]:
     """The frames; the holes and the flow where the figure shows them."""
+    if scene.surface is not None:
+        return (Artifact("frames", "synth", images.LIGHT, ("texture", "sample", "carry", "seed", "shape", "surface"),
+                         (("sample", "once"), ("surface", "once")), make_on_surface),)
     needs: Any = (("sample", "once"), ("L", "until"), *solid_input(scene))
     make, keys = {"carry": (make_by_carry, "carry"), "paper": (make_by_paper, "paper"),
                   "pixels": (make_by_pixels, "paper")}[scene.texture.method]
