@@ -240,12 +240,27 @@ def _expanded(starts: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndar
     return which, np.arange(len(which)) + np.repeat(starts[rows] - np.cumsum(count) + count, count)
 
 
-def pieces(of: Charts, near: Around, scale: float, reach: np.ndarray, elongation: float) -> Pieces:
+class Centres(NamedTuple):
+    """Where patches are, and their axes.
+
+    face          (P,) int64: the triangle that the centre lies in
+    place         (P, 3) float64: its barycentric coordinates
+    normal, axis  (P, 3) float64, unit vectors
+    """
+
+    face: np.ndarray
+    place: np.ndarray
+    normal: np.ndarray
+    axis: np.ndarray
+
+
+def pieces(of: Charts, centres: Centres, scale: float, reach: np.ndarray, elongation: float) -> Pieces:
     """The triangles that are whole in the charts of patches and within their reach (P,), pixels, the measure of an
-    elongated patch; without those that the chart turns over or distorts.
+    elongated patch; without those that the chart turns over or distorts. That of its centre each patch has.
 
     scale  world units in a pixel
     """
+    near = around(of, *centres)
     mesh, count = of.mesh, len(of.mesh.vertices)
     by_first = np.argsort(mesh.faces[:, 0], kind="stable")
     starts = np.searchsorted(mesh.faces[by_first, 0], np.arange(count + 1))
@@ -269,8 +284,19 @@ def pieces(of: Charts, near: Around, scale: float, reach: np.ndarray, elongation
     stays = (area > 1 / DISTORTED) & (area < DISTORTED) & (nearest - edge < reach[patch])
     flat = np.concatenate([places[:, 0], b, c], axis=1)[stays].astype(np.float32)
     patch, face = patch[stays], face[stays]
+    bare = np.setdiff1d(np.arange(len(centres.face)), patch[face == centres.face[patch]])
+    patch, face = np.concatenate([patch, bare]), np.concatenate([face, centres.face[bare]])
+    flat = np.concatenate([flat, _flat(mesh, Centres(*(part[bare] for part in centres)), scale)])
     order = np.lexsort([patch, face])
     return Pieces(np.searchsorted(face[order], np.arange(len(mesh.faces) + 1)).astype(np.int32),
                   patch[order].astype(np.int32), flat[order])
 
 
+def _flat(of: Mesh, centres: Centres, scale: float) -> np.ndarray:
+    """The triangles of centres, each in its own plane, as `Pieces.corners` has them."""
+    plane = unit(of.area_vectors[centres.face])
+    axis = aligned(centres.axis, centres.normal, plane)
+    offset = (of.corners[centres.face] - of.at(of.vertices, centres.face, centres.place)[:, None]) / scale
+    places = np.stack([dot(offset, axis[:, None]), dot(offset, np.cross(plane, axis)[:, None])], axis=-1)
+    flat = [places[:, 0], places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]]
+    return np.concatenate(flat, axis=1).astype(np.float32)

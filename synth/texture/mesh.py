@@ -93,9 +93,7 @@ class Mesh:
     def curvature(self) -> np.ndarray:
         """(V,) float64: the size of the Gaussian curvature, per square of world units, from the sums of angles round
         each vertex; the mean of its surroundings, 0 at the border."""
-        to_next, to_last = (unit(np.roll(self.corners, -k, axis=1) - self.corners) for k in (1, 2))
-        angle = np.arccos(np.clip(dot(to_next, to_last), -1, 1))
-        missing = 2 * np.pi - self._sum_at_vertices(angle)
+        missing = 2 * np.pi - self._sum_at_vertices(angles(self.corners))
         inner = np.ones(len(self.vertices), bool)
         inner[np.roll(self.faces, -1, axis=1)[self.beside < 0]] = False
         inner[np.roll(self.faces, -2, axis=1)[self.beside < 0]] = False
@@ -137,6 +135,12 @@ def area_vectors(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.cross(b - a, c - a)
 
 
+def angles(corners: np.ndarray) -> np.ndarray:
+    """Angles (F, 3) of triangles at their corners (F, 3, 3), radians."""
+    to_next, to_last = (unit(np.roll(corners, -k, axis=1) - corners) for k in (1, 2))
+    return np.arccos(np.clip(dot(to_next, to_last), -1, 1))
+
+
 def aligned(vectors: np.ndarray, normal: np.ndarray, to: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) turned by the rotation that takes unit `normal` to unit `to` the shortest way.
 
@@ -164,8 +168,9 @@ def mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
     used, faces = np.unique(faces, return_inverse=True)
     vertices, faces = vertices[used], faces.reshape(-1, 3)
     _require_surface(vertices, faces)
-    weighted = area_vectors(vertices, faces)
-    sums = [np.bincount(faces.ravel(), np.repeat(along, 3), len(vertices)) for along in weighted.T]
+    # weighted by angle: on the rim of a thin plate the normal leads out of it, however large its sides are
+    weighted = unit(area_vectors(vertices, faces))[:, None] * angles(vertices[faces])[..., None]
+    sums = [np.bincount(faces.ravel(), along.ravel(), len(vertices)) for along in np.moveaxis(weighted, -1, 0)]
     return Mesh(vertices, faces, unit(np.stack(sums, axis=-1)))
 
 

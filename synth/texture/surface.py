@@ -21,7 +21,7 @@ from synth.texture import bake, measures
 from synth.texture.anchors import Anchors
 from synth.texture.atlas import LANES, Texels
 from synth.texture.carry import FEWEST, TURN, Settings
-from synth.texture.charts import Pieces, around, charts, pieces
+from synth.texture.charts import Centres, Pieces, charts, pieces
 from synth.texture.mesh import Mesh, continued, dot, length, turning, unit, walked
 from synth.texture.patches import (
     AX,
@@ -208,8 +208,8 @@ class Synthesis:
 
     def _pieces(self, face: np.ndarray, place: np.ndarray, lie: Turned) -> Pieces:
         """The triangles in the charts of patches."""
-        near = around(self.charts, face, place, lie.normal, lie.axis)
-        return pieces(self.charts, near, self.scale, self.settings.window * lie.radius, self.settings.elongation)
+        return pieces(self.charts, Centres(face, place, lie.normal, lie.axis), self.scale,
+                      self.settings.window * lie.radius, self.settings.elongation)
 
     def _tables(self, now: State, ground: Ground) -> tuple[Pieces, np.ndarray]:
         """The triangles in the charts of a state's patches, and the patches as the kernels read them (P, FIELDS).

@@ -9,7 +9,7 @@ import pytest
 
 from synth.texture import bake
 from synth.texture.atlas import LANES, Texels, atlas
-from synth.texture.charts import Pieces, around, charts, pieces
+from synth.texture.charts import Centres, Pieces, charts, pieces
 from synth.texture.mesh import Mesh, dot, unit
 from synth.texture.patches import (
     AX,
@@ -57,8 +57,8 @@ def patches(of: Mesh, count: int = 6, seed: int = 3) -> tuple[np.ndarray, Pieces
     values[:, BIAS] = np.where(random.random(count) < 0.3, 2.0, 0)
     values[:, NEAR] = NEVER
     found = charts(of, scale * 1.7 * 1.23 * 9)
-    near = around(found, face, place, normal, axis)
-    return values, pieces(found, near, scale, 1.7 * radius, 1.5), of.at(of.vertices, face, place), axis
+    near = pieces(found, Centres(face, place, normal, axis), scale, 1.7 * radius, 1.5)
+    return values, near, of.at(of.vertices, face, place), axis
 
 
 @pytest.mark.parametrize("of", [SQUARE, SPHERE], ids=["square", "sphere"])

@@ -117,8 +117,8 @@ def test_pieces_are_the_triangles_within_reach() -> None:
     of = meshes.square()
     face, place, normal, axis = patches(of)
     found = charts.charts(of, REACH)
-    near = charts.around(found, face, place, normal, axis)
-    pieces = charts.pieces(found, near, 0.5, np.full(len(face), 4.0), 1.0)
+    centres = charts.Centres(face, place, normal, axis)
+    pieces = charts.pieces(found, centres, 0.5, np.full(len(face), 4.0), 1.0)
     assert (np.diff(pieces.starts) >= 0).all() and pieces.starts[-1] == len(pieces.patch)
     # by triangle, then by patch, none twice
     key = pieces.face * len(face) + pieces.patch
@@ -131,6 +131,25 @@ def test_pieces_are_the_triangles_within_reach() -> None:
     # a pixel is half a unit: areas are four times as large
     _, _, bx, by, cx, cy = pieces.corners.T
     np.testing.assert_allclose((bx * cy - by * cx) / 2, 4 * of.areas[pieces.face], rtol=1e-4)
+
+
+def test_each_patch_has_the_triangle_of_its_centre_where_its_chart_is_of_no_use(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the site that bore it would stay bare, and bear in each frame."""
+    monkeypatch.setattr(charts, "DISTORTED", 1.0)  # no triangle is good enough
+    of = meshes.sphere(1)
+    face, place, normal, axis = patches(of)
+    centres = charts.Centres(face, place, normal, axis)
+    found = charts.pieces(charts.charts(of, 1.0), centres, 0.1, np.full(20, 20.0), 1.0)
+    order = np.argsort(found.patch)
+    np.testing.assert_array_equal(found.patch[order], np.arange(20))
+    np.testing.assert_array_equal(found.face[order], face)
+    own = found.corners[order].reshape(20, 3, 2).astype(np.float64)
+    # the centre is at 0, 0, and the triangle as large as it is
+    centre = own[:, 0] + place[:, 1:2] * own[:, 1] + place[:, 2:] * own[:, 2]
+    np.testing.assert_allclose(centre, 0, atol=1e-5)
+    area = (own[:, 1, 0] * own[:, 2, 1] - own[:, 1, 1] * own[:, 2, 0]) / 2
+    np.testing.assert_allclose(area, 100 * of.areas[face], rtol=1e-5)
 
 
 def test_a_mesh_much_finer_than_its_texture_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,9 +10,10 @@ import pytest
 
 from synth.texture.atlas import atlas
 from synth.texture.carry import Settings
-from synth.texture.mesh import Mesh, length
+from synth.texture.mesh import Mesh, length, mesh, refined
 from synth.texture.procedural import DIRECTION, canes
 from synth.texture.sample import sample
+from synth.texture.shapes import tangent
 from synth.texture.surface import PATCHES, State, Synthesis
 
 SAMPLE = sample(canes(40, seed=1), direction=DIRECTION)
@@ -66,6 +67,23 @@ def test_every_texel_is_covered_in_every_frame(of: Mesh, speed: float) -> None:
         assert not shown.reshape(-1, 3)[beside].any()
     assert len(state.id) > 10
     assert (state.born > len(state.id)) == (of is not BALL)  # over a border some came, some went
+
+
+def test_sharp_edges_and_a_thin_plate_are_covered_too() -> None:
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    faces = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
+                      [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])
+    for thickness in (1.0, 0.03):
+        plate = mesh(corners * [1, 1, thickness], faces)
+        of, _ = refined(plate, np.zeros((8, 0)), 0.2)
+        v = tangent(of, np.broadcast_to([0.02, 0.01, 0.005], of.vertices.shape))
+        maker, state, made = Synthesis(SAMPLE, of, SMALL, 4, 0.02), None, atlas(of, (250, 250))
+        for _ in range(6):
+            state = maker.frame(v, state)
+        shown = maker.picture(state, v, made.texels(), made.shape).reshape(-1, 3)[made.texels().number]
+        assert (shown.sum(axis=1) > 0).all()
+        # as many as in the plane, about one for 1.6 squares of the radius; more where the rim is narrower than they are
+        assert len(state.id) < (1.0 if thickness == 1 else 3.0) * of.areas.sum() / 0.02**2 / 8**2
 
 
 def test_on_a_plane_patches_move_as_the_field_does() -> None:
