@@ -16,6 +16,7 @@ In the order data passes through them:
     seaweed         blades under water
     school          fish in a cube of water
     noodles         threads as noodles on a plate
+    ceramic         a glazed surface that shows a texture
     paper           sheets of paper in the air
     beads           particles of the plane as beads on paper, around obstacles
     tonemap         linear light to display values, and these to eight bits

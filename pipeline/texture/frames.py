@@ -17,6 +17,7 @@ from pipeline.files import fields, images
 from pipeline.files.format import Format
 from pipeline.flow import past_obstacles, solid_input, upsampled, walls
 from pipeline.texture.samples import read_sample
+from pipeline.texture.surfaces import pixel, read_back
 from pipeline.texture.tables import TextureScene
 from synth.field import Field
 
@@ -80,6 +81,22 @@ def make_by_carry(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Ite
 def make_maps(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The UV maps: (h, w, 6), u, v and weight of the strongest patch of each pixel, then of the next."""
     yield from ((frame, synthesis.maps(state)[::-1]) for frame, synthesis, state in _carried(scene, inputs, frames))
+
+
+def make_on_surface(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The frames on a surface: the texture of all its triangles, each where `surface` has it."""
+    from synth.texture import shapes, surface
+    from synth.texture.atlas import Atlas
+
+    mesh, field, uv = read_back(inputs.read("surface"))
+    rows, columns = scene.shape
+    table, scale = scene.texture, pixel(scene, mesh.vertices)
+    least, most = (table.pace,) * 2 if table.speed == "normalized" else (table.slowest, table.fastest)
+    v = shapes.paced(field, least * scale, most * scale)
+    synthesis = surface.Synthesis(_sample(scene, inputs), mesh, scene.carry.settings(), scene.seed, scale)
+    texels = Atlas.of_uv(uv, (rows, columns)).texels()
+    for frame, state in _resumed(inputs, frames, surface.State, lambda _, before: synthesis.frame(v, before)):
+        yield frame, synthesis.picture(state, v, texels, (rows, columns))[::-1]
 
 
 def write_maps(file: Path, maps: np.ndarray) -> None:
@@ -157,15 +174,26 @@ def _mask(scene: TextureScene, inputs: Inputs) -> np.ndarray | None:
 
 def _states(scene: TextureScene, inputs: Inputs, frames: list[int], method: Any, settings: Any,
             ) -> Iterator[tuple[int, Any, Any]]:
-    """(frame, synthesis, state) of each of `frames`. An interrupted run goes on from the last state: same bits."""
+    """(frame, synthesis, state) of each of `frames`."""
     synthesis = method.Synthesis(_sample(scene, inputs), scene.shape, settings, scene.seed)
     mask = _mask(scene, inputs)
+
+    def after(frame: int, before: Any) -> Any:
+        return synthesis.frame(velocity(scene, inputs, frame), before, mask)
+
+    yield from ((frame, synthesis, state) for frame, state in _resumed(inputs, frames, method.State, after))
+
+
+def _resumed(inputs: Inputs, frames: list[int], kind: Any, after: Callable[[int, Any], Any],
+             ) -> Iterator[tuple[int, Any]]:
+    """(frame, state) of each of `frames`, where `after` gives the state of a frame by that before it. An interrupted
+    run goes on from the last state: same bits."""
     kept = inputs.checkpoint.load(before=frames[0])
-    done, state = (kept[0], method.State.of(kept[1])) if kept else (0, None)
+    done, state = (kept[0], kind.of(kept[1])) if kept else (0, None)
     for frame in range(done + 1, frames[-1] + 1):
-        state = synthesis.frame(velocity(scene, inputs, frame), state, mask)
+        state = after(frame, state)
         if frame in frames:
-            yield frame, synthesis, state
+            yield frame, state
         if frame < frames[-1]:
             inputs.checkpoint.save(frame, state.arrays())
 
@@ -240,6 +268,9 @@ def make_zoom(scene: TextureScene, inputs: Inputs, frames: list[int]) -> Iterato
 
 def frame_artifacts(scene: TextureScene) -> tuple[Artifact, ...]:
     """The frames; the holes and the flow where the figure shows them."""
+    if scene.surface is not None:
+        return (Artifact("frames", "synth", images.LIGHT, ("texture", "sample", "carry", "seed", "shape", "surface"),
+                         (("sample", "once"), ("surface", "once")), make_on_surface),)
     source, loop = "flow" if scene.texture.divergence_free else "L", scene.texture.loop
     needs: Any = (("sample", "once"), (source, "every" if loop else "until"), *solid_input(scene))
     reads = (*READS, "frames") if loop else READS

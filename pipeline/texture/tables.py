@@ -1,7 +1,7 @@
 """The tables of wang05's synthesis, and what a scene of a moving texture is to them.
 
-A key's section (§) is wang05's. The tables [sample], [coarse] and [[obstacles]] stand with what they do: `samples`,
-`pipeline.flow`; `scene` puts all of them together.
+A key's section (§) is wang05's. The tables [sample], [surface], [render], [coarse] and [[obstacles]] stand with what
+they do: `samples`, `surfaces`, `looks`, `pipeline.flow`; `scene` puts all of them together.
 """
 
 from __future__ import annotations
@@ -21,12 +21,15 @@ Reach = Annotated[float, Field(ge=6, le=40)]
 class Texture(Table):
     """The moving texture."""
 
-    size: Annotated[tuple[Cells, Cells], Strict(False)] = key("columns and rows of the picture", (512, 512), "pixels")
+    size: Annotated[tuple[Cells, Cells], Strict(False)] = key(
+        "columns and rows of the picture; of a surface, of the texture that holds all its triangles", (512, 512),
+        "pixels")
     method: Literal["carry", "paper", "pixels"] = key(
         "\"carry\": long-lived patches that carry coordinates into the sample; \"paper\": the paper's, which carries "
         "colours; \"pixels\": the paper's first frame, its pixels moved one by one (figure 3)", "carry")
     speed: Literal["limited", "normalized"] = key(
-        "the flow's own, within slowest and fastest (§3), or the same everywhere (figures 8, 9 and 11)", "limited")
+        "the flow's own, within slowest and fastest (§3), or the same everywhere (figures 8, 9 and 11); on a surface "
+        "pixels are the sample's, and the field is scaled so that its largest speed is fastest", "limited")
     slowest: float = key("least speed, with speed = \"limited\"", 0.3, "pixels per frame", ge=0, le=100)
     fastest: float = key("largest speed, with speed = \"limited\"", 2.2, "pixels per frame", gt=0, le=100)
     divergence_free: bool = key(
@@ -53,7 +56,8 @@ class Carry(Table):
     blend: Annotated[float, Field(ge=0, le=1)] | Literal["auto"] = key(
         "share of the blend that keeps the variance; \"auto\": so that the first frame has the sample's contrast",
         "auto")
-    repair: float = key("share of the patches whose seams are tested in a frame", 0.125, ge=0, le=1)
+    repair: float = key("share of the patches whose seams are tested in a frame; on a surface none are", 0.125, ge=0,
+                        le=1)
 
     def settings(self) -> Any:
         """As synth.texture.carry takes them."""
@@ -118,6 +122,8 @@ class TextureScene(SceneInFlow):
 
     if TYPE_CHECKING:
         sample: Any
+        surface: Any
+        render: Any
         texture: Texture
         carry: Carry
         paper: Paper

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import tiny
 from scipy import ndimage
-from tiny import BY_PAPER, LOOP, TEXTURE, Memory, changed, scene
+from tiny import BY_PAPER, LOOP, TEXTURE, TEXTURE_ON_SURFACE, Memory, changed, scene
 
 from pipeline.build.graph import computed
 from pipeline.files import images
@@ -152,6 +152,23 @@ def test_the_length_of_a_loop_is_in_its_key_alone(tmp_path: Path) -> None:
     loop = made(LOOP)
     tiny.made(tmp_path, changed(LOOP, "frames = 6", "frames = 7"), "synth")
     assert made(changed(LOOP, "frames = 6", "frames = 7")) != loop
+
+
+def test_an_interrupted_run_on_a_surface_goes_on_with_the_same_bits(tmp_path: Path) -> None:
+    one = scene(tmp_path, TEXTURE_ON_SURFACE)
+    graph = tiny.made(tmp_path, TEXTURE_ON_SURFACE, "synth")
+    frames = next(a for a in METHOD.artifacts(one) if a.name == "frames")
+    surface = graph.read("", "surface", 0)
+    stopped = Memory(tmp_path, sample=graph.read("", "sample", 0), surface=surface)
+    list(zip(range(2), computed(frames, one, stopped, [1, 2, 3]), strict=False))
+    kept = stopped.checkpoint.load(before=3)
+    assert kept is not None and kept[0] in (1, 2)
+    last = dict(computed(frames, one, stopped, [3]))[3]
+    np.testing.assert_array_equal(last.astype(np.float16).astype(np.float32), graph.read("", "frames", 3))
+    # every triangle shows something, and it moves
+    rows, columns = (np.clip((places * 256).astype(int), 0, 255) for places in (1 - surface["t"], surface["s"]))
+    assert (last[rows, columns].sum(axis=1) > 0).mean() > 0.95  # a corner may be nearest to another's texel
+    assert np.abs(last - graph.read("", "frames", 1)).mean() > 1e-3
 
 
 @pytest.mark.parametrize("text", [STONE, STONE.replace("size = [64, 48]", 'size = [64, 48]\nmethod = "paper"')],

@@ -211,7 +211,7 @@ def test_a_mask_without_any_pixel_of_texture():
 def test_usage_counts_the_anchors_of_living_patches():
     synthesis, states = frames(vortex(), 30)
     state = states[-1]
-    np.testing.assert_array_equal(state.usage, synthesis._used(np.zeros_like(state.usage), state.anchor, 1))
+    np.testing.assert_array_equal(state.usage, synthesis.anchors.used(np.zeros_like(state.usage), state.anchor, 1))
     assert state.born > len(state.id) and (np.diff(state.id) > 0).all()
     assert {len(getattr(state, name)) for name in PATCHES} == {len(state.id)}
 
