@@ -44,8 +44,9 @@ def ground_fits(scene: Scene) -> Faults:
         yield "obstacles", "are of a texture in the plane, and there is a [surface]"
     if texture.method != "carry":
         yield "texture.method", f'"{texture.method}" is of a texture in the plane; on a [surface] it is "carry"'
-    for name, given in (("texture.maps", texture.maps), ("texture.loop", texture.loop), ("figure.zoom", figure.zoom),
-                        ("texture.divergence_free", texture.divergence_free), ("figure.overlay", figure.overlay != "none")):
+    for name, given in (("texture.maps", texture.maps), ("texture.loop", texture.loop),
+                        ("texture.divergence_free", texture.divergence_free), ("figure.zoom", figure.zoom),
+                        ("figure.overlay", figure.overlay != "none")):
         if given:
             yield name, "is of a texture in the plane, and there is a [surface]"
     for panel in figure.panels:

@@ -28,7 +28,7 @@ def test_a_table_texture_makes_it_a_scene_of_them(tmp_path: Path) -> None:
     ("size = [64, 48]", 'size = [64, 48]\nmethod = "paper"\nloop = true',
      'texture.loop: is of patches: there are none with method = "paper"'),
     ("size = [64, 48]", "size = [64, 48]\nloop = true",
-     "frames: a loop of 3 is too short: patches that grow for 8 frames (carry.growth) need 36"),
+     "frames: a loop of 3 is too short: patches that grow for 12 frames (carry.growth) need 36"),
     ("panel = 32", "panel = 32\nmoments = [4]", "figure.moments[0]: the animation has 3 frames"),
     ('[coarse]\nkind = "analytic"\nflow = "rotation"\nsize = [16, 12]\n', "",
      "coarse: is missing; so is [surface], the other ground of a texture"),
