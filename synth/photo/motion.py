@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-CELL = 8
-"""Pixels of a cell, over which motion and texture are averaged: 6 × 6 cells in a piece."""
+CELL = 4
+"""Pixels of a clip's cell, over which its motion and texture are averaged."""
 BANDS = 5
 SIGNIFICANT = 0.15
 """Pixels per frame: the least mean motion of a pixel that is used (fig. 5 d)."""

@@ -43,8 +43,8 @@ def test_a_mean_is_a_vector_and_what_stands_does_not_move():
     flow[:, :, 48:, 0] = -1.5
     found = motion(flow)
     assert found.mean.shape == (SHAPE[0] // CELL, SHAPE[1] // CELL, 2)
-    np.testing.assert_allclose(found.mean[:, 6:], np.broadcast_to([-1.5, 0], (8, 6, 2)))
-    np.testing.assert_array_equal(found.moving, [[0] * 6 + [1] * 6] * 8)
+    np.testing.assert_allclose(found.mean[:, 12:], np.broadcast_to([-1.5, 0], (16, 12, 2)))
+    np.testing.assert_array_equal(found.moving, [[0] * 12 + [1] * 12] * 16)
     assert not found.bands.any()
 
 
@@ -83,8 +83,8 @@ def test_octaves_hold_each_frequency_once(frames):
 def test_cells_are_means_and_what_is_left_over_is_left_out():
     values = np.arange(20 * 17, dtype=np.float32).reshape(20, 17)
     found = in_cells(values)
-    assert found.shape == (2, 2)
-    np.testing.assert_allclose(found[1, 0], values[8:16, :8].mean())
+    assert found.shape == (5, 4)
+    np.testing.assert_allclose(found[2, 0], values[8:12, :4].mean())
 
 
 def test_a_pyramid_adds_up():
@@ -98,7 +98,7 @@ def test_a_pyramid_adds_up():
 
 def test_textureness_knows_strength_and_scale():
     fine, coarse = (textureness(np.stack([grain(sigma=s)] * 2)) for s in (0.7, 4.0))
-    assert fine.shape == (8, 12, LEVELS)
+    assert fine.shape == (16, 24, LEVELS)
     assert fine[..., 0].mean() > 3 * coarse[..., 0].mean()
     assert coarse[..., 3].mean() > fine[..., 3].mean()
     half = textureness(np.stack([np.uint8(128 + (grain(sigma=0.7) - 128.0) / 2)] * 2))
