@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from synth.photo.carried import LIFE, ages, carried, lifetime, paths
+from synth.photo.photograph import LIFE, ages, carried, lifetime, paths
 
 SHAPE = (72, 96)
 

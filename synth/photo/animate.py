@@ -1,0 +1,145 @@
+"""A photograph begins to flow (okabe11 §3, fig. 2): assignment, differences, the look of the target, dynamic boundaries.
+
+The paper's frame is the average image and the differences. Ours mixes in the photograph itself, carried along the motion,
+by one number from 0, the paper's, to 1: it keeps the streaks and edges by which the viewer knows the picture, and the
+differences add what the picture does not have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from synth.photo.appearance import added, average, extended, gains, matched
+from synth.photo.assign import Assigned, Database, Nodes, Settings, Wanted, assign
+from synth.photo.boundary import dynamic_matte
+from synth.photo.photograph import carried
+from synth.photo.integrate import Differences, Frames, differences, motion_field
+from synth.photo.pieces import Cut
+
+CALMED = 0.35
+"""What of the differences is left, of their full strength, where the photograph is carried in full: it moves itself."""
+REGION = 64
+"""Pixels of a region in which histograms are matched."""
+TOWARDS = 0.9
+"""Share of the wanted direction in the motion that the photograph is carried by; the rest is that of the pieces."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """How frames are composed.
+
+    carried   0..1: the photograph carried along the motion, in place of the blurred average
+    strength  of the differences
+    matching  "gains": by the strength of bands, over all time, for fire and smoke; "histograms": frame by frame and
+              region by region as in the paper, for water; "none"
+    dynamics  τ of the dynamic matte; 0: it stands still
+    """
+
+    carried: float = 0.85
+    strength: float = 1.0
+    matching: Literal["gains", "histograms", "none"] = "gains"
+    dynamics: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.carried <= 1 or self.strength < 0:
+            raise ValueError(f"the carried share is in 0..1 and the strength not negative, not {self.carried} and "
+                             f"{self.strength}")
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A picture that shall flow.
+
+    picture     (Y, X, 3) float32, display-encoded, 0..1, row 0 the lowest
+    matte       (Y, X) float32 in 0..1: where the fluid is
+    background  (Y, X, 3) float32: what is seen where the matte leaves; None: the picture
+    frozen      (Y, X) bool: what stands still in the fluid; None: nothing
+    wanted      the user's orientation and speed
+    """
+
+    picture: np.ndarray
+    matte: np.ndarray
+    background: np.ndarray | None = None
+    frozen: np.ndarray | None = None
+    wanted: Wanted = Wanted()
+
+    @property
+    def fluid(self) -> np.ndarray:
+        """The matte without what stands still: (Y, X) float32."""
+        return self.matte if self.frozen is None else np.where(self.frozen, np.float32(0), self.matte)
+
+    @property
+    def grey(self) -> np.ndarray:
+        """(Y, X) uint8, what descriptors see."""
+        return np.rint(255 * np.clip(self.picture.mean(axis=2), 0, 1)).astype(np.uint8)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What is found before the first frame: pieces, their differences, and the motion (Y, X, 2), pixels per frame."""
+
+    of: Nodes
+    found: Assigned
+    differences: Differences
+    motion: np.ndarray
+
+
+def plan(target: Target, database: Database, frames: Frames, cut: Cut, settings: Settings, length: int,
+         seed: int) -> Plan:
+    """§5, and of §6 the integration. Raises ValueError for an empty matte."""
+    shape = (target.picture.shape[0], target.picture.shape[1])
+    of, found = assign(target.grey, target.fluid, database, cut, target.wanted, settings)
+    split = differences(of, found, database, frames, shape, cut, length, seed)
+    return Plan(of, found, split, _motion(target, motion_field(of, found, database, shape, cut)))
+
+
+def _motion(target: Target, motion: np.ndarray) -> np.ndarray:
+    """The pieces' motion, turned towards what the user wants, at the wanted speed; nothing outside the fluid."""
+    speed = np.hypot(motion[..., 0], motion[..., 1]) if target.wanted.speed is None else target.wanted.speed
+    turned = motion
+    if target.wanted.orientation is not None:
+        turned = TOWARDS * speed[..., None] * target.wanted.orientation + (1 - TOWARDS) * motion
+    size = np.hypot(turned[..., 0], turned[..., 1])
+    scaled = turned * (speed / np.maximum(size, 1e-6))[..., None]
+    return np.where(target.fluid[..., None] > 0, scaled, 0).astype(np.float32)
+
+
+def composed(target: Target, of: Plan, look: Look, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Frame by frame the picture (Y, X, 3) float32 and the matte (Y, X) float32: §6, "Recovery of Color Appearance" on.
+
+    1. The ground: the average, and the photograph carried.
+    2. The differences, matched to the target.
+    3. Both together, over the background by the matte.
+    """
+    length = of.differences.bands.shape[1]
+    fluid = extended(target.picture, target.matte)
+    # 1. ground
+    still = average(fluid, of.motion) if look.carried < 1 else fluid
+    moving = carried(fluid, of.motion, length, seed, target.frozen) if look.carried > 0 else None
+    grey = fluid.mean(axis=2)
+    strength = look.strength * (1 - look.carried * (1 - CALMED))
+    # 2. differences
+    scale = (np.full_like(of.differences.bands[:, 0], 1 / 255) if look.matching == "none"
+             else gains(grey, of.differences.bands, target.fluid))
+    mattes = _mattes(target, of.motion, look, length)
+    for frame in range(length):
+        ground = still if moving is None else (1 - look.carried) * still + look.carried * moving[frame]
+        more = (scale * of.differences.bands[:, frame]).sum(axis=0) * strength
+        shown = added(ground, more)
+        if look.matching == "histograms":
+            wanted = matched(shown.mean(axis=2), grey, target.fluid, REGION)
+            shown = added(shown, wanted - shown.mean(axis=2))
+        # 3. together
+        matte = mattes[frame] if target.frozen is None else np.where(target.frozen, np.float32(0), mattes[frame])
+        behind = target.picture if target.background is None else target.background
+        yield (matte[..., None] * shown + (1 - matte[..., None]) * behind).astype(np.float32), matte
+
+
+def _mattes(target: Target, motion: np.ndarray, look: Look, length: int) -> np.ndarray:
+    if look.dynamics == 0:
+        return np.broadcast_to(target.matte, (length, *target.matte.shape))
+    return dynamic_matte(target.matte, np.broadcast_to(motion, (length, *motion.shape)), look.dynamics)
