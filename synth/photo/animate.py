@@ -1,14 +1,15 @@
-"""A photograph begins to flow (okabe11 §3, fig. 2): assignment, differences, the look of the target, dynamic boundaries.
+"""A photograph begins to flow (okabe11 §3, fig. 2): assignment, differences, the look of the target, dynamic
+boundaries.
 
-The paper's frame is the average image and the differences. Ours mixes in the photograph itself, carried along the motion,
-by one number from 0, the paper's, to 1: it keeps the streaks and edges by which the viewer knows the picture, and the
-differences add what the picture does not have.
+The paper's frame is the average image and the differences. Ours mixes in the photograph itself, carried along the
+motion, by one number from 0, the paper's, to 1: it keeps the streaks and edges by which the viewer knows the picture,
+and the differences add what the picture does not have.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -16,8 +17,8 @@ import numpy as np
 from synth.photo.appearance import added, average, extended, gains, matched
 from synth.photo.assign import Assigned, Database, Nodes, Settings, Wanted, assign
 from synth.photo.boundary import dynamic_matte
-from synth.photo.photograph import carried
 from synth.photo.integrate import Differences, Frames, differences, motion_field
+from synth.photo.photograph import carried
 from synth.photo.pieces import Cut
 
 CALMED = 0.35
@@ -65,7 +66,7 @@ class Target:
     matte: np.ndarray
     background: np.ndarray | None = None
     frozen: np.ndarray | None = None
-    wanted: Wanted = Wanted()
+    wanted: Wanted = field(default_factory=Wanted)
 
     @property
     def fluid(self) -> np.ndarray:

@@ -2,8 +2,8 @@
 
 "We can synthesize an image that corresponds to the average image and add it onto the integrated differences … by
 applying image-based motion blur [BE01] and Gaussian blur to the target image." Then the differences are given the
-target's own strength of detail, band by band, and added where there is room for them: in the logit of the grey level, so
-that white water does not clip and a dark pool does not turn grey.
+target's own strength of detail, band by band, and added where there is room for them: in the logit of the grey level,
+so that white water does not clip and a dark pool does not turn grey.
 
 Pictures are (Y, X[, 3]) float32, display-encoded, 0..1.
 """

@@ -1,7 +1,7 @@
 """Dynamic boundaries of fire and smoke (okabe11 §6, fig. 10).
 
-"We repeatedly synthesize the time-varying alpha matte B_i: B_{i+1} = τ W_i(B_i) + (1 - τ) α, where B_1 is equal to α and
-τ controls the dynamics of B_i. We also apply an area-preserving adjustment each time B_i is computed."
+"We repeatedly synthesize the time-varying alpha matte B_i: B_{i+1} = τ W_i(B_i) + (1 - τ) α, where B_1 is equal to α
+and τ controls the dynamics of B_i. We also apply an area-preserving adjustment each time B_i is computed."
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """What a user says of the motion: strokes, interpolated to an orientation map, and a speed map (okabe11 §5, fig. 8).
 
-"The user draws using strokes and generates an orientation map by interpolating the sparsely drawn strokes using a radial
-basis function." Strokes have a sense: from their first point to their last. The function is the
-distance r, with a constant: it knows no scale, does not overshoot between strokes, and far from all of them it tends to
-a mean.
+"The user draws using strokes and generates an orientation map by interpolating the sparsely drawn strokes using a
+radial basis function." Strokes have a sense: from their first point to their last. The function is the distance r,
+with a constant: it knows no scale, does not overshoot between strokes, and far from all of them it tends to a mean.
 
 Points are x, y in pixels, rows from the lowest; velocities are pixels per frame.
 """
@@ -72,8 +71,8 @@ def orientation(strokes: Sequence[np.ndarray], shape: tuple[int, int], frozen: n
         of = parts[y, x]
         for part in range(1, count + 1):
             if (of == part).any() and (of != part).any():
-                found = np.where((parts == part)[..., None], _interpolated(points[of == part], tangents[of == part], shape),
-                                 found)
+                alone = _interpolated(points[of == part], tangents[of == part], shape)
+                found = np.where((parts == part)[..., None], alone, found)
     return found
 
 

@@ -13,7 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from synth.photo.motion import BANDS, CELL, LEVELS, Motion, motion, optical_flow, textureness
-from synth.photo.pieces import SCALES, VERSIONS, Cut, Version, canvas, inside, of_scaled, shrunk, turned_vectors, warped
+from synth.photo.pieces import (
+    SCALES,
+    VERSIONS,
+    Cut,
+    canvas,
+    inside,
+    of_scaled,
+    shrunk,
+    turned_vectors,
+    warped,
+)
 from synth.photo.words import descriptors, histograms, nearest_words
 
 EXPOSURES = (0, 16, 4)
@@ -23,7 +33,8 @@ CELLS = 6
 MOVING = 0.25
 """The least share of a piece that moves; "any video example in which no pixel position has significant motion is
 completely removed" (§4)."""
-MEAN, BAND, TEXTURE, DEVIATION = slice(0, 2), slice(2, 2 + BANDS), slice(2 + BANDS, 2 + BANDS + LEVELS), 2 + BANDS + LEVELS
+MEAN, BAND = slice(0, 2), slice(2, 2 + BANDS)
+TEXTURE, DEVIATION = slice(2 + BANDS, 2 + BANDS + LEVELS), 2 + BANDS + LEVELS
 FEATURES = DEVIATION + 1
 
 

@@ -1,11 +1,11 @@
-"""Integration of the assigned pieces (okabe11 §6, fig. 9): their differences from their averages, blended band by band,
-and the motion field of the animation.
+"""Integration of the assigned pieces (okabe11 §6, fig. 9): their differences from their averages, blended band by
+band, and the motion field of the animation.
 
 "Our strategy for seamless integration is to decompose a video example piece into its average image and differences. …
 We apply an image pyramid [BA83] and perform alpha blending for each sub-band."
 
-Weights of a pixel have squares that add up to one, not sums: differences of two clips have nothing in common, and a mean
-of two of them has 0.7 of their deviation. Fine bands change hands over a short way, coarse ones over a long one.
+Weights of a pixel have squares that add up to one, not sums: differences of two clips have nothing in common, and a
+mean of two of them has 0.7 of their deviation. Fine bands change hands over a short way, coarse ones over a long one.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ def differences(of: Nodes, found: Assigned, database: Database, frames: Frames, 
                 length: int, seed: int) -> Differences:
     """The differences of the assigned pieces on a target of `shape` (Y, X), `length` frames that loop.
 
-    1. Of each node: its piece's frames less their average. A clip that is shorter repeats, one that is longer is cut and
-       its end mixed into its beginning. Pieces begin at phases at random, but a piece that continues a neighbour's does
-       so in time too.
+    1. Of each node: its piece's frames less their average. A clip that is shorter repeats, one that is longer is cut
+       and its end mixed into its beginning. Pieces begin at phases at random, but a piece that continues a neighbour's
+       does so in time too.
     2. Its bands, each with the weight that belongs to it.
     """
     total = np.zeros((BANDS, length, *shape), np.float32)

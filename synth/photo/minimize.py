@@ -3,11 +3,12 @@
     E(l) = Σ_p V_p(l_p) + λ Σ_(p,q) W_pq(l_p, l_q)
 
 `sequential_messages` (TRW-S, Kolmogorov 2006) is the default: it asks nothing of W and gives a lower bound.
-`alpha_expansion` is the paper's ("the graph-cut method with a-expansion [BVZ01]"). The paper's W is a squared distance of
-different pieces, no metric: a third of its terms must be truncated for a cut to exist, and what it finds is no better
-than that of `conditional_modes`, the simplest.
+`alpha_expansion` is the paper's ("the graph-cut method with a-expansion [BVZ01]"). The paper's W is a squared
+distance of different pieces, no metric: a third of its terms must be truncated for a cut to exist, and what it finds
+is no better than that of `conditional_modes`, the simplest.
 
-All are sequential and in double precision: the same bits at any number of threads. Of equal labels the first is taken.
+All are sequential and in double precision: the same bits at any number of threads. Of equal labels the first is
+taken.
 """
 
 from __future__ import annotations

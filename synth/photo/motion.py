@@ -1,12 +1,13 @@
 """The motion of a clip, and what of it pieces are compared by (okabe11 §4, §5).
 
 "We compute optical flow between neighboring frames to obtain an average through all of the frames. … Only a pixel
-position with a significant averaged motion is used; other pixels are masked out" (§4, fig. 5). The paper's flow is TV-L1
-[Zach et al. 2007]; ours is DIS [Kroeger et al. 2016], a tenth of its time. A clip that was simulated brings its own mean
-velocity, which DIS underestimates in foam.
+position with a significant averaged motion is used; other pixels are masked out" (§4, fig. 5). The paper's flow is
+TV-L1 [Zach et al. 2007]; ours is DIS [Kroeger et al. 2016], a tenth of its time. A clip that was simulated brings its
+own mean velocity, which DIS underestimates in foam.
 
-Eq. 2 compares power spectra of the motion. The power of the mean forgets its sign: half of the pairs of pieces nearest
-by it flow apart by more than a right angle. So the mean stays a vector, and only the rest are powers, in BANDS octaves.
+Eq. 2 compares power spectra of the motion. The power of the mean forgets its sign: half of the pairs of pieces
+nearest by it flow apart by more than a right angle. So the mean stays a vector, and only the rest are powers, in
+BANDS octaves.
 
 Velocities are pixels per frame; pictures (Y, X), row 0 the lowest.
 """

@@ -1,10 +1,10 @@
 """The photograph carried along the motion (beyond okabe11): what the viewer knows of the picture, its streaks and the
 shape of its edges, moves instead of being averaged away.
 
-Carried for long, a picture is torn. So two copies are carried, half a lifetime apart; each begins where it lies in the
-photograph, moves for a lifetime of LIFE frames at most, and has no weight when it begins and when it ends. The lifetimes
-of different places begin at different times, a smooth noise apart: nothing pulses. After a whole number of lifetimes all
-is as it was, so a clip of that length is a loop.
+Carried for long, a picture is torn. So two copies are carried, half a lifetime apart; each begins where it lies in
+the photograph, moves for a lifetime of LIFE frames at most, and has no weight when it begins and when it ends. The
+lifetimes of different places begin at different times, a smooth noise apart: nothing pulses. After a whole number of
+lifetimes all is as it was, so a clip of that length is a loop.
 
 Squares of the weights add up to one. What stands still (`held`) is not carried, and nothing is read from it.
 """

@@ -1,11 +1,13 @@
 """Pieces of clips and of the target (okabe11 §4, fig. 4): where they lie, and what their pixels are.
 
-"We flip each video example horizontally …; we also make three versions of each video example by scaling them to 50, 75,
-and 100% of their original size. We also make three versions … by rotating the original by -22.5, 0.0, and +22.5 degrees.
-Each version is then cut into smaller pieces with a resolution of 48×48 pixels, allowing neighboring pieces to overlap."
+"We flip each video example horizontally …; we also make three versions of each video example by scaling them to 50,
+75, and 100% of their original size. We also make three versions … by rotating the original by -22.5, 0.0, and +22.5
+degrees. Each version is then cut into smaller pieces with a resolution of 48×48 pixels, allowing neighboring pieces
+to overlap."
 
-A piece is a clip, a version and the corner of a square in it. Its pixels are never kept: they are read from the clip by
-one affine map when they are wanted. Points are x, y in pixels, row 0 the lowest; a pixel's centre is a whole number.
+A piece is a clip, a version and the corner of a square in it. Its pixels are never kept: they are read from the clip
+by one affine map when they are wanted. Points are x, y in pixels, row 0 the lowest; a pixel's centre is a whole
+number.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Visual words (okabe11 §4): SIFT descriptors on a regular grid, a codebook of them by repeated bisection, histograms of
-words with a spatial pyramid, and how much two histograms have in common (Eq. 1).
+"""Visual words (okabe11 §4): SIFT descriptors on a regular grid, a codebook of them by repeated bisection, histograms
+of words with a spatial pyramid, and how much two histograms have in common (Eq. 1).
 
 "We extract SIFT features … at each point on a regular grid of 9×9 over the 48×48 pixel resolution image." One grid is
 laid over a whole picture, GRID points to the edge of a piece, and pieces that overlap share its points.

@@ -9,7 +9,18 @@ import processes
 import pytest
 from scipy import ndimage
 
-from synth.photo.index import BAND, CELLS, DEVIATION, EXPOSURES, FEATURES, MEAN, TEXTURE, described_by, exposures, index
+from synth.photo.index import (
+    BAND,
+    CELLS,
+    DEVIATION,
+    EXPOSURES,
+    FEATURES,
+    MEAN,
+    TEXTURE,
+    described_by,
+    exposures,
+    index,
+)
 from synth.photo.pieces import VERSIONS, Cut
 from synth.photo.words import codebook, common, descriptors
 

@@ -63,7 +63,8 @@ def test_the_deviation_is_the_same_between_pieces_and_at_their_middles():
     random = np.random.Generator(np.random.Philox(7))
     corners = [(int(y), int(x)) for y, x in random.integers(0, [48, 80], (count, 2))]
     clips = {k: noise(k, 24) for k in range(count)}
-    found = differences(of, assigned(range(count)), database(corners, range(count)), clips.__getitem__, SHAPE, CUT, 24, 1)
+    base = database(corners, range(count))
+    found = differences(of, assigned(range(count)), base, clips.__getitem__, SHAPE, CUT, 24, 1)
     deviation = found.bands.sum(axis=0).std(axis=0)
     y, x = (np.mgrid[:64, :96] % 16)
     middle, between = (np.abs(y - 8) < 2) & (np.abs(x - 8) < 2), (y < 1) | (x < 1)

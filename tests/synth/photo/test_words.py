@@ -6,7 +6,16 @@ import numpy as np
 import processes
 import pytest
 
-from synth.photo.words import GRID, TOTAL, codebook, common, common_reference, descriptors, histograms, nearest_words
+from synth.photo.words import (
+    GRID,
+    TOTAL,
+    codebook,
+    common,
+    common_reference,
+    descriptors,
+    histograms,
+    nearest_words,
+)
 
 
 def picture(seed=1, shape=(96, 120)):
@@ -56,7 +65,8 @@ def test_what_is_no_grey_picture_is_refused(wrong):
 def blobs(count=5, each=80, seed=2):
     random = np.random.Generator(np.random.Philox(seed))
     centres = random.integers(20, 235, (count, 128))
-    return centres, np.clip(np.rint(centres[:, None] + random.normal(0, 3, (count, each, 128))), 0, 255).astype(np.uint8)
+    samples = np.rint(centres[:, None] + random.normal(0, 3, (count, each, 128)))
+    return centres, np.clip(samples, 0, 255).astype(np.uint8)
 
 
 def test_planted_clusters_become_the_words():
