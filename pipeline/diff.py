@@ -24,6 +24,7 @@ from pipeline.files import images
 
 SUM_TOLERANCE = 1e-6  # of a frame's sums, relative to the sum of its absolute values
 VALUE_TOLERANCE = 1e-5  # of any value, relative to the frame's largest
+HALF_TOLERANCE = 2.0**-10  # of a picture's value, likewise: another processor may round to the half float beside it
 PIXEL_TOLERANCE = 1e-3  # of a pixel, relative to its reference
 PIXEL_FLOOR = 1e-2  # a pixel darker than this share of the picture's mean counts as that bright
 PIXEL_SHARE = 1e-3  # of the pixels may differ by more: another SIMD width changes up to 2 of 9,216
@@ -40,17 +41,18 @@ def compared_sums(name: str, new: dict[str, Any], old: dict[str, Any]) -> Findin
     return Finding(name, fault, measured)
 
 
-def compared_values(name: str, new: np.ndarray, old: np.ndarray) -> Finding:
-    """Whether two fields or volumes have the same shape, the same sums and the same values."""
+def compared_values(name: str, new: np.ndarray, old: np.ndarray, is_light: bool = False) -> Finding:
+    """Whether two fields, volumes or, if they are light, pictures have the same shape, sums and values."""
     overall = compared_sums(name, references.sums(new), references.sums(old))
     if new.shape != old.shape:
-        return replace(overall, old=old, new=new)
+        return replace(overall, old=old, new=new, is_light=is_light)
     scale = max(float(np.abs(old).max()), float(np.finfo(np.float32).tiny))
     worst = float(np.abs(new.astype(np.float64) - old).max()) / scale
     measured = f"largest difference {worst:.2g} of the largest value"
-    fault = "" if worst <= VALUE_TOLERANCE else f"{measured}, tolerance {VALUE_TOLERANCE:g}"
+    tolerance = HALF_TOLERANCE if is_light else VALUE_TOLERANCE
+    fault = "" if worst <= tolerance else f"{measured}, tolerance {tolerance:.2g}"
     both = [part for part in (overall.fault, fault) if part]
-    return Finding(name, "; ".join(both), f"{overall.measured}; {measured}", old, new)
+    return Finding(name, "; ".join(both), f"{overall.measured}; {measured}", old, new, is_light)
 
 
 def compared_light(name: str, new: np.ndarray, old: np.ndarray) -> Finding:
@@ -97,8 +99,7 @@ def findings(graph: BuildGraph, folder: Path, record: dict[str, Any]) -> Iterato
         if old is None:
             yield Finding(made.path, "is new; the reference does not have it")
         elif made.path in record["files"]:
-            finding = compared_values(made.path, made.values(made.file), made.values(folder / made.path))
-            yield replace(finding, is_light=made.is_light)
+            yield compared_values(made.path, made.values(made.file), made.values(folder / made.path), made.is_light)
         else:
             yield compared_sums(made.path, references.sums(made.values(made.file)), old)
     for proof in references.proofs(graph):

@@ -102,11 +102,13 @@ def png() -> str:
 
 
 def video() -> str:
-    """Encodes two frames and counts them."""
+    """Encodes two frames in each format and counts them."""
     from pipeline.files import video
 
-    video.write(Path("trial.mp4"), [np.zeros((16, 16, 3)), np.ones((16, 16, 3))], 30.0)
-    return f"H.264 by PyAV {version('av')}"
+    frames = [np.zeros((16, 16, 3)), np.ones((16, 16, 3))]
+    video.write(Path("trial.mp4"), frames, 30.0)
+    video.write_webp(Path("trial.webp"), frames, 30.0)
+    return f"H.264 and WebP by PyAV {version('av')}"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The figure: panels, labels, legends, as one still X.png and one animation X.mp4.
+"""The figure: panels, labels, legends, as one still X.png and one animation X.mp4, on request X.webp too.
 
 A scene without variants has its panels in one row (or rows of `figure.columns`). With variants and one panel,
 that panel stands once for each variant; with several panels, each variant has a row.
@@ -6,8 +6,9 @@ that panel stands once for each variant; with several panels, each variant has a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,31 +21,33 @@ from pipeline.files import pictures, video
 from pipeline.progress import Progress
 
 INSET = 0.27  # of a panel's width
-READS = ("frames", "fps", "figure.frame", "figure.animation", "figure.columns", "figure.labels")
+READS = ("frames", "fps", "figure.frame", "figure.animation", "figure.webp", "figure.columns", "figure.labels")
 """What the figure reads of each scene, beside its panels."""
 
 
 def make(graph: BuildGraph, progress: Progress) -> None:
-    """Set X.png and X.mp4, unless they are up to date. The images must be."""
+    """Set X.png, X.mp4 and X.webp, unless they are up to date. The images must be."""
     figure = Figure(graph)
     folder = manifest.Folder(graph.root)
-    png, mp4 = f"{graph.name}.png", f"{graph.name}.mp4"
-    keys = {png: figure.key([figure.shown_frame], still=True)}
-    if figure.first.figure.animation:
-        keys[mp4] = figure.key(range(1, figure.frames + 1))
+    png = f"{graph.name}.png"
+    keys = {png: figure.key([figure.shown_frame], pictures.write, still=True)}
+    moving = {f"{graph.name}.{suffix}": write for suffix, write in figure.animations.items()}
+    keys |= {name: figure.key(range(1, figure.frames + 1), write) for name, write in moving.items()}
     if not folder.up_to_date(png, keys[png]):
         pictures.write(graph.root / png, figure.sheet(figure.shown_frame, still=True))
         folder.add(png, keys[png])
-    if mp4 in keys and not folder.up_to_date(mp4, keys[mp4]):
-        with progress.task("figure", figure.frames) as advance:
+    for name, write in moving.items():
+        if folder.up_to_date(name, keys[name]):
+            continue
+        with progress.task(name, figure.frames) as advance:
 
-            def sheets() -> Iterator[np.ndarray]:
+            def sheets(advance: Callable[[], None] = advance) -> Iterator[np.ndarray]:
                 for frame in range(1, figure.frames + 1):
                     yield figure.sheet(frame)
                     advance()
 
-            video.write(graph.root / mp4, sheets(), figure.first.fps)
-        folder.add(mp4, keys[mp4])
+            write(graph.root / name, sheets(), figure.first.fps)
+        folder.add(name, keys[name])
     folder.close(keys, {"scene": graph.name, "stage": "figure"})
 
 
@@ -61,6 +64,13 @@ class Figure:
         self.frames: int = max(scene.frames for scene in self.scenes.values())
         self.shown_frame: int = self.first.figure.frame or self.frames
 
+    @property
+    def animations(self) -> dict[str, Callable[[Path, Iterator[np.ndarray], float], int]]:
+        """What writes each file of the animation, by its suffix."""
+        if not self.first.figure.animation:
+            return {}
+        return {"mp4": video.write} | ({"webp": video.write_webp} if self.first.figure.webp else {})
+
     def _with_labels(self, variant: str, panels: Sequence[Panel]) -> list[tuple[Panel, str]]:
         labels = self.scenes[variant].figure.labels or [panel.label for panel in panels]
         return list(zip(panels, labels, strict=True))
@@ -71,8 +81,8 @@ class Figure:
         return {variant: [(panel, label) for panel, label in panels if panel.shown_in != hidden]
                 for variant, panels in self._labelled.items()}
 
-    def key(self, frames: Sequence[int], still: bool = False) -> str:
-        """What a figure of these frames depends on."""
+    def key(self, frames: Sequence[int], write: Callable[..., Any], still: bool = False) -> str:
+        """What a figure of these frames depends on, written by `write`."""
         places = [(variant, panel) for variant, panels in self.panels(still).items() for panel, _ in panels]
         panels = [[variant, [[asdict(panel), label] for panel, label in panels]]
                   for variant, panels in self.panels(still).items()]
@@ -80,7 +90,7 @@ class Figure:
                   for variant, panel in places for frame in frames
                   for name in (self.artifact(panel, still), panel.inset) if name]
         read = {self.graph.artifacts[variant][panel.artifact].format.read for variant, panel in places}
-        code = source_digest.digest([Figure.sheet, pictures.write, video.write, *read])
+        code = source_digest.digest([Figure.sheet, write, *read])
         return manifest.digest([panels, self.first.figure.columns, self.first.fps, hashes, code])
 
     def artifact(self, panel: Panel, still: bool) -> str:
@@ -116,7 +126,8 @@ class Figure:
         if panel.inset:
             light = self._light(variant, panel.inset, panel.frame or frame)
             inset = layout.fitted(tonemap.to_display(light, panel.tone), round(INSET * panel.width))
-        return layout.Panel(picture, label, inset=inset, legend=lic.wheel(panel.width // 6) if panel.legend else None)
+        return layout.Panel(picture, label, inset=inset, legend=lic.wheel(panel.width // 6) if panel.legend else None,
+                            border=panel.border)
 
     def _light(self, variant: str, name: str, frame: int) -> np.ndarray:
         picture: np.ndarray = self.graph.read(variant, name, self.frame_of(variant, name, frame))

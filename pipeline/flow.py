@@ -8,7 +8,8 @@ place in `Coarse` or `Obstacle`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from pydantic import Field, Strict
 from pipeline.build.artifact import Artifact, Inputs, Needs, Reads
 from pipeline.build.method import Faults
 from pipeline.errors import BadInput
-from pipeline.files import fields, meshes, netcdf, pictures, volumes
+from pipeline.files import fields, meshes, netcdf, pictures, video, volumes
 from pipeline.tables import Asset, Grid, Radius, SceneTables, Table, grid, key, listed
 from synth.field import Field as MotionField
 from synth.field import domain_origin
@@ -59,6 +60,18 @@ class Motion(Table):
     def gaps(self, scene: SceneInFlow) -> list[obstacle.Obstacle]:
         """Where it has no values: one solid, or none if it has them everywhere."""
         return []
+
+    def check(self, scene: SceneInFlow) -> None:
+        """Refuse a file that cannot be used: raises BadInput."""
+
+    @property
+    def unit(self) -> str:
+        """The unit of `speeds`, as a legend says it."""
+        return "heights per second"
+
+    def speeds(self, L: Iterable[MotionField]) -> Iterator[np.ndarray]:
+        """Of each L, world units per second, the speed that a legend shows: (Y, X) or (Z, Y, X) float32."""
+        yield from (np.linalg.norm(one.values, axis=-1) for one in L)
 
     def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
         """L, world units per second. A simulation is run from its start: at its resolution that costs little."""
@@ -167,16 +180,23 @@ class FileMotion(Motion):
     file: Asset = key("EXR (channels x, y) or VDB (grid vel; its middle slice, in 3-D all of it), heights per second; "
                       "it fills the domain, wherever it lies and whatever its voxels")
 
-    def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
-        """L, world units per second: the field of the file in every frame."""
-        steady = fields.read_user_field(self.file, "coarse.file", scene.dimension)
-        size, cells = steady.shape[::-1], scene.cells
-        if not steady.values.any():
+    def check(self, scene: SceneInFlow) -> None:
+        self._read(scene)
+
+    def _read(self, scene: SceneInFlow) -> MotionField:
+        """The field of the file, world units per second."""
+        read = fields.read_user_field(self.file, "coarse.file", scene.dimension)
+        size, cells = read.shape[::-1], scene.cells
+        if not read.values.any():
             raise BadInput(self.file, "coarse.file", "is 0 everywhere")
         if not _alike(cells, size):
             raise BadInput(self.file, "coarse.file",
                            f"{listed(size)} has not the shape of {scene.cells_key}, {listed(cells)}")
-        steady = MotionField.centred(steady.values, scene.dimension)
+        return MotionField.centred(read.values, scene.dimension)
+
+    def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
+        """L, world units per second: the field of the file in every frame."""
+        steady = self._read(scene)
         if "solid" in inputs:
             values = past_obstacles(scene, inputs, steady.per_frame(scene.fps).values)
             steady = MotionField.centred(values, scene.dimension).per_second(scene.fps)
@@ -202,14 +222,15 @@ class NetcdfMotion(Motion):
     size: Grid = grid("columns and rows of L", (64, 64))
     window: Annotated[tuple[Longitude, Latitude, Longitude, Latitude], Strict(False)] | None = key(
         "west, south, east, north, of which the domain shows the largest part of its proportions, a degree as long in "
-        "both directions; none: all there is", None, "degrees")
+        "both directions; on such a map what moves to the east is faster by 1 over the cosine of the latitude, from 85 "
+        "degrees on as there; none: all there is", None, "degrees")
     first: int = key("first time step, counted from 0", 0, ge=0, le=10**6)
     last: Annotated[int, Field(ge=0, le=10**6)] | None = key("last time step; none: the last there is", None)
     step: float = key("time from a time step to the next; between them L is interpolated, after the last it stays",
                       30.0, "frames", gt=0, le=100000)
     cyclic: bool = key("after the last time step comes the first again, as in a climatology", False)
-    speed: float = key("rms speed of all time steps, to which the file's is scaled", 0.1, "heights per second", gt=0,
-                       le=1000)
+    speed: float = key("rms speed of all time steps on the map, to which the file's is scaled", 0.1,
+                       "heights per second", gt=0, le=1000)
 
     def faults(self, scene: SceneInFlow) -> Faults:
         if scene.dimension == 3:
@@ -221,11 +242,33 @@ class NetcdfMotion(Motion):
         if self.window and self.window[2] - self.window[0] > 360:
             yield "coarse.window", "is wider than the globe"
 
+    def check(self, scene: SceneInFlow) -> None:
+        self._read()
+
     def _read(self) -> netcdf.Currents:
         found = netcdf.read_foreign(self.file, "coarse", self.u, self.v, self.first, self.last, self.window)
         if not (found.u.any() or found.v.any()):
             raise BadInput(self.file, "coarse.file", f"{self.u} and {self.v} are 0 wherever they have values")
         return found
+
+    def _per_unit(self, found: netcdf.Currents) -> float:
+        """Heights per second on the map, at the equator, for one of the file's unit."""
+        values, share = found.on(self.size[::-1])
+        rms = np.sqrt(np.mean(np.sum(values[:, share >= 0.5].astype(np.float64) ** 2, axis=-1)))
+        return float(self.speed / max(rms, 1e-30))
+
+    @property
+    def unit(self) -> str:
+        unit = self._read().unit or "the file's unit"
+        return re.sub(r"^(\w+)[ .]s(\^|\*\*)?-1$", r"\1/s", unit)
+
+    def speeds(self, L: Iterable[MotionField]) -> Iterator[np.ndarray]:
+        """The data's speeds, not those on the map, in the file's unit."""
+        found = self._read()
+        per_unit = np.float32(self._per_unit(found))
+        for one in L:
+            eastward = one.values[..., 0] * netcdf.shrunk(found.places(one.shape)[0])[:, None]
+            yield np.hypot(eastward, one.values[..., 1]) / per_unit
 
     def gaps(self, scene: SceneInFlow) -> list[obstacle.Obstacle]:
         from synth import obstacle
@@ -240,22 +283,67 @@ class NetcdfMotion(Motion):
 
     def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
         """L, world units per second."""
-        values, share = self._read().on(self.size[::-1])
-        rms = np.sqrt(np.mean(np.sum(values[:, share >= 0.5].astype(np.float64) ** 2, axis=-1)))
-        values *= np.float32(self.speed / max(rms, 1e-30))
+        found = self._read()
+        values = found.on(self.size[::-1])[0] * np.float32(self._per_unit(found))
         for frame in frames:
-            time = (frame - 1) / self.step
-            time = time % len(values) if self.cyclic else min(time, len(values) - 1)
-            before = int(time)
-            t, after = np.float32(time - before), (before + 1) % len(values)
-            field = MotionField.centred((1 - t) * values[before] + t * values[after], 2)
+            field = MotionField.centred(_between(values, (frame - 1) / self.step, self.cyclic), 2)
             if "solid" in inputs:
                 past = past_obstacles(scene, inputs, field.per_frame(scene.fps).values)
                 field = MotionField.centred(past, 2).per_second(scene.fps)
             yield frame, field
 
 
-Coarse = SmokeMotion | NoiseMotion | WakeMotion | AnalyticMotion | FileMotion | NetcdfMotion
+class ClipMotion(Motion):
+    """L is the optical flow of a clip: what moves there moves the scene."""
+
+    kind: Literal["clip"] = key("the motion in a clip")
+    file: Asset = key("a video; of its pictures the largest part of the domain's proportions is taken, in the middle, "
+                      "one height high")
+    size: Grid = grid("columns and rows of L", (64, 64))
+    scale: float = key("what the clip's speeds are multiplied by", 1.0, gt=0, le=1000)
+    step: float = key("time from a frame of the clip to the next; between them L is interpolated, after the last it "
+                      "stays", 1.0, "frames", gt=0, le=100000)
+    cyclic: bool = key("after the clip's last frame comes its first again", False)
+    smoothing: float = key("standard deviation of a Gaussian over time; 0: none", 1.0, "frames of the clip", ge=0,
+                           le=100)
+
+    def faults(self, scene: SceneInFlow) -> Faults:
+        if scene.dimension == 3:
+            yield "coarse.kind", f'"clip" is a flow of the plane; {scene.cells_key} is {listed(scene.cells)}'
+
+    def check(self, scene: SceneInFlow) -> None:
+        self._read()
+
+    def _read(self) -> np.ndarray:
+        """The clip's motion (N - 1, Y, X, 2), cells of L per frame of the clip."""
+        from synth.optical_flow import coarse_flow
+
+        grey = video.read_grey(self.file, "coarse.file")
+        try:
+            return coarse_flow(grey, self.size[::-1], self.smoothing, self.cyclic)
+        except ValueError as error:
+            raise BadInput(self.file, "coarse.file", str(error)) from error
+
+    def make(self, scene: SceneInFlow, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, MotionField]]:
+        """L, world units per second."""
+        values = self._read() * np.float32(self.scale / self.step)
+        for frame in frames:
+            field = _between(values, (frame - 1) / self.step, self.cyclic)
+            if "solid" in inputs:
+                field = past_obstacles(scene, inputs, field)
+            yield frame, MotionField.centred(field, 2).per_second(scene.fps)
+
+
+def _between(values: np.ndarray, time: float, cyclic: bool) -> np.ndarray:
+    """Values (T, ...) at a time from 0, linear between two of them; after the last it stays, or the first follows."""
+    time = time % len(values) if cyclic else min(time, len(values) - 1)
+    before = int(time)
+    t, after = np.float32(time - before), (before + 1) % len(values)
+    between: np.ndarray = (1 - t) * values[before] + t * values[after]
+    return between
+
+
+Coarse = SmokeMotion | NoiseMotion | WakeMotion | AnalyticMotion | FileMotion | NetcdfMotion | ClipMotion
 
 
 # -- obstacles ----------------------------------------------------------------------------------------------------
@@ -463,5 +551,7 @@ def coarse_artifact(scene: SceneInFlow) -> Artifact:
     """L."""
     past = ("shape", "border") if scene.obstacles and not scene.coarse.passes_obstacles else ()
     reads = ("coarse", "seed", "fps", "dimension", *scene.coarse.reads, *past)
-    return Artifact("L", "synth", fields.velocity(scene.dimension, scene.fps), reads,
-                    solid_input(scene) if scene.obstacles else (), scene.coarse.make)
+    # without solids its first frame is tried before anything is made, with them only its file can be
+    inputs, check = (solid_input(scene), scene.coarse.check) if scene.obstacles else ((), None)
+    return Artifact("L", "synth", fields.velocity(scene.dimension, scene.fps), reads, inputs, scene.coarse.make,
+                    check=check)

@@ -227,12 +227,14 @@ def _figure_fits(method: Method, scene: Any) -> Faults:
     figure = scene.figure
     if figure.frame > scene.frames:
         yield "figure.frame", f"the animation has {scene.frames} frames"
+    if figure.webp and not figure.animation:
+        yield "figure.webp", "there is no animation with figure.animation = false"
     panels = len(method.panels(scene))
     if figure.labels and len(figure.labels) != panels:
         yield "figure.labels", f"{len(figure.labels)} labels, but {panels} panel{'s' if panels != 1 else ''}"
 
 
-ONE_FIGURE = ("fps", "figure.frame", "figure.animation", "figure.columns")
+ONE_FIGURE = ("fps", "figure.frame", "figure.animation", "figure.webp", "figure.columns")
 """What the one still and the one animation of a file have once, however many variants they show."""
 
 

@@ -165,7 +165,7 @@ def row(name: str, field: FieldInfo) -> str:
 def heading(path: str, model: type[BaseModel]) -> str:
     """What a table is called: its path, and the kinds that this form of it is for."""
     kind = model.model_fields.get("kind")
-    kinds = ", ".join(f'"{k}"' for k in typing.get_args(kind.annotation)) if kind and "." not in path else ""
+    kinds = ", ".join(f'"{k}"' for k in typing.get_args(kind.annotation)) if kind else ""
     return (f"[{path}]" if path else "Top of the file") + (f" kind = {kinds}" if kinds else "")
 
 

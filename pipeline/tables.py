@@ -136,6 +136,12 @@ class FigureTable(Table):
     panel: int = key("width of a panel", 512, "pixels", ge=16, le=LARGEST)
     frame: int = key("the frame the still shows; 0: the last", 0, ge=0, le=100000)
     animation: bool = key("make X.mp4 too; else bake and render the still's frame alone", True)
+    webp: bool = key("make X.webp beside X.mp4: the same pictures as animated WebP that repeats without end, which web "
+                     "pages show as a picture", False)
+
+    def shown(self, frames: int) -> list[int]:
+        """The frames of an animation of so many that the still shows, ascending."""
+        return [self.frame or frames]
 
 
 PROOF_WIDTH, PROOF_SAMPLES = 96, 8

@@ -16,9 +16,11 @@ In the order data passes through them:
     seaweed         blades under water
     school          fish in a cube of water
     noodles         threads as noodles on a plate
+    ceramic         a glazed surface that shows a texture
     paper           sheets of paper in the air
     beads           particles of the plane as beads on paper, around obstacles
     tonemap         linear light to display values, and these to eight bits
+    speed_map       speed as colour over a texture, and its legend
     layout          panels, labels, insets and legends as one figure
 
 Fields and densities have y up, row 0 the lowest; pictures have their top row first. Pictures are linear Rec.709 light,

@@ -19,19 +19,25 @@ def rgb(colour: studio.Point) -> dict[str, Any]:
 
 
 def shape(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray | None,
-          bsdf: dict[str, Any], smooth: bool = True, vertex_normals: np.ndarray | None = None) -> Any:
+          bsdf: dict[str, Any], smooth: bool = True, vertex_normals: np.ndarray | None = None,
+          uv: np.ndarray | None = None) -> Any:
     """A mesh with a linear colour (N, 3) at each vertex, for VERTEX_COLOUR, and smooth or flat shading.
 
     vertex_normals  (N, 3) for smooth shading; None: `normals`
+    uv              (N, 2) where each vertex is in a bitmap, 0 at its left and lower edge; None: nowhere
     """
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict(bsdf)
-    made = mi.Mesh(name, len(vertices), len(faces), props=properties, has_vertex_normals=smooth)
+    made = mi.Mesh(name, len(vertices), len(faces), props=properties, has_vertex_normals=smooth,
+                   has_vertex_texcoords=uv is not None)
     if colours is not None:
         made.add_attribute("vertex_color", 3, np.ascontiguousarray(colours, np.float32).ravel())
     parameters = mi.traverse(made)
     parameters["vertex_positions"] = np.ascontiguousarray(vertices, np.float32).ravel()
     parameters["faces"] = np.ascontiguousarray(faces, np.uint32).ravel()
+    if uv is not None:
+        # a bitmap's v grows from its upper edge
+        parameters["vertex_texcoords"] = np.stack([uv[:, 0], 1 - uv[:, 1]], -1).astype(np.float32).ravel()
     parameters.update()
     if smooth:
         # Mitsuba adds up its own normals in any order: other bits in each run

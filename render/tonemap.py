@@ -36,8 +36,11 @@ def from_srgb(display: np.ndarray) -> np.ndarray:
 def to_display(light: np.ndarray, curve: Curve) -> np.ndarray:
     """Linear light (h, w, 3) as sRGB display values (h, w, 3) float32 in [0, 1].
 
-    "filmic" for rendered scenes; "straight", without a tone curve, for ink, whose paper must stay white.
+    "filmic" for rendered scenes; "straight", without a tone curve, for ink, whose paper must stay white. Light with
+    alpha (h, w, 4), by which its colours are multiplied, lies on white.
     """
+    if light.shape[-1] == 4:
+        light = light[..., :3] + (1 - light[..., 3:])
     return to_srgb(filmic(light) if curve == "filmic" else light).astype(np.float32)
 
 
@@ -59,12 +62,19 @@ def _triangular(shape: tuple[int, ...], seed: int) -> np.ndarray:
     return np.asarray(rng.random(shape, dtype=np.float32) - rng.random(shape, dtype=np.float32))
 
 
+_TO_CONES = np.array([[1.0, 0.3963377774, 0.2158037573],
+                      [1.0, -0.1055613458, -0.0638541728],
+                      [1.0, -0.0894841775, -1.2914855480]])
+_TO_RGB = np.array([[4.0767416621, -3.3077115913, 0.2309699292],
+                    [-1.2684380046, 2.6097574011, -0.3413193965],
+                    [-0.0041960863, -0.7034186147, 1.7076147010]])
+
+
 def oklab_to_linear(oklab: np.ndarray) -> np.ndarray:
     """Oklab (..., 3) (Ottosson 2020) as linear Rec.709, unclipped."""
-    to_cones = np.array([[1.0, 0.3963377774, 0.2158037573],
-                         [1.0, -0.1055613458, -0.0638541728],
-                         [1.0, -0.0894841775, -1.2914855480]])
-    to_rgb = np.array([[4.0767416621, -3.3077115913, 0.2309699292],
-                       [-1.2684380046, 2.6097574011, -0.3413193965],
-                       [-0.0041960863, -0.7034186147, 1.7076147010]])
-    return (oklab @ to_cones.T) ** 3 @ to_rgb.T
+    return (oklab @ _TO_CONES.T) ** 3 @ _TO_RGB.T
+
+
+def linear_to_oklab(linear: np.ndarray) -> np.ndarray:
+    """Linear Rec.709 (..., 3) as Oklab (..., 3), the inverse of `oklab_to_linear`: lightness, a and b, float64."""
+    return np.asarray(np.cbrt(linear @ np.linalg.inv(_TO_RGB).T) @ np.linalg.inv(_TO_CONES).T)

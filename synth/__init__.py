@@ -10,6 +10,7 @@ In the order data passes through them:
     projection  Helmholtz-Hodge projection, exact in a box, and past obstacles
     wake        a river past a round stone [Bridson et al. 2007]
     smoke       a simulated plume [Stam 1999; Fedkiw et al. 2001]
+    optical_flow  the motion in a clip
     pyramid     image pyramids of fields
     motion/     motion field texture synthesis (ma09)
     elements/   dynamic element textures (ma13)

@@ -155,9 +155,34 @@ BY_PAPER = changed(TEXTURE, "size = [64, 48]", 'size = [64, 48]\nmethod = "paper
     '"flow", "result"', '"holes", "result"').replace("panel = 32", "panel = 32\nmoments = [1, 3]")
 LOOP = changed(changed(TEXTURE, "frames = 3", "frames = 6"), "size = [64, 48]",
                "size = [64, 48]\nloop = true\n[carry]\ngrowth = 2")
+TINTED = changed(changed(TEXTURE, "size = [64, 48]", "size = [64, 48]\ndivergence_free = true"), "panel = 32",
+                 'panel = 32\noverlay = "speed"\nwebp = true')
+TEXTURE_ON_SURFACE = """\
+title = "Canes round a ring"
+seed = 3
+frames = 3
+[sample]
+kind = "canes"
+size = 32
+[surface]
+kind = "torus"
+scale = 0.6
+field = { kind = "around" }
+[texture]
+size = [256, 256]
+[render]
+kind = "ceramic"
+width = 32
+height = 24
+spp = 1
+[figure]
+panels = ["sample", "result"]
+panel = 32
+"""
 SCENES = {"smoke": SMOKE, "river": RIVER, "volume": VOLUME, "space": SPACE, "potential": POTENTIAL,
           "lagrangian": LAGRANGIAN, "beads": BEADS, "fish": FISH, "noodles": NOODLES, "paper": PAPER,
-          "texture": TEXTURE, "texture by the paper": BY_PAPER, "texture that loops": LOOP}
+          "texture": TEXTURE, "texture by the paper": BY_PAPER, "texture of true speed": TINTED,
+          "texture that loops": LOOP, "texture on a surface": TEXTURE_ON_SURFACE}
 """Scenes that together have every stage, every look and every way to synthesize."""
 
 

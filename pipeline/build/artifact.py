@@ -81,9 +81,12 @@ class Artifact:
         return f"{self.name}{number}.{self.format.suffix}"
 
     def frames(self, scene: Any) -> list[int]:
-        """The frames there are: 1 to scene.frames; the still's alone where there is no animation; or [0]."""
+        """The frames there are: 1 to scene.frames; those of the still alone where there is no animation; or [0]."""
         if not self.animated:
             return [0]
-        if self.still or (self.stage != "synth" and not scene.figure.animation):
+        if self.still:
             return [scene.figure.frame or scene.frames]
+        if self.stage != "synth" and not scene.figure.animation:
+            frames: list[int] = scene.figure.shown(scene.frames)
+            return frames
         return list(range(1, scene.frames + 1))

@@ -22,6 +22,7 @@ class Panel:
     legend    whether a colour wheel stands in its corner
     inset     the artifact in a corner of it, "" for none
     frame     the frame that it always shows, 0 for that of the figure
+    border    whether it has a thin border
     shown_in  "still" or "animation" alone, or "both"
     """
 
@@ -33,6 +34,7 @@ class Panel:
     legend: bool = False
     inset: str = ""
     frame: int = 0
+    border: bool = True
     shown_in: Literal["both", "still", "animation"] = "both"
 
 

@@ -11,7 +11,15 @@ from pipeline.elements.coarse import Carried
 from pipeline.elements.exemplars import Exemplar
 from pipeline.elements.looks import Render
 from pipeline.elements.tables import Elements, ElementsScene, Figure, Synthesis
-from pipeline.flow import AnalyticMotion, FileMotion, NetcdfMotion, NoiseMotion, Obstacle, WakeMotion
+from pipeline.flow import (
+    AnalyticMotion,
+    ClipMotion,
+    FileMotion,
+    NetcdfMotion,
+    NoiseMotion,
+    Obstacle,
+    WakeMotion,
+)
 from pipeline.tables import key, listed
 
 
@@ -22,8 +30,8 @@ class Scene(ElementsScene):
     fps: float = key("speed of the animation", 24, "frames per second", ge=1, le=1000)
     exemplar: Exemplar = Field(discriminator="kind")
     elements: Elements
-    coarse: Annotated[NoiseMotion | WakeMotion | AnalyticMotion | FileMotion | NetcdfMotion | Carried,
-                      Field(discriminator="kind")] | None = key(
+    coarse: Annotated[NoiseMotion | WakeMotion | AnalyticMotion | FileMotion | NetcdfMotion | ClipMotion |
+                      Carried, Field(discriminator="kind")] | None = key(
         "the coarse motion; none: elements do not move", None)
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = key(
         "solids that elements keep out of, an array of tables [[obstacles]]", (), max_length=64)

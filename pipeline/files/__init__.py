@@ -13,5 +13,5 @@ polygons     a user's PLY and OBJ as they stand, and the elements that their ver
 tracks       element tracks: our own .npz; tables, sequences of meshes and curves of a user's
 netcdf       NetCDF 3 and 4: a user's wind or current on latitude and longitude
 usd          OpenUSD: one file of a whole animation of elements
-video        H.264
+video        H.264 and animated WebP
 """

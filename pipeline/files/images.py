@@ -87,7 +87,7 @@ def _own(path: Path) -> dict[str, Any]:
 
 def write_picture(path: Path, picture: np.ndarray, *, half: bool = False,
                   metadata: Mapping[str, str] | None = None) -> None:
-    """Write a linear picture (h, w, 3), or (h, w, 4) with alpha."""
+    """Write a linear picture (h, w, 3), or (h, w, 4) with alpha, by which its colours are multiplied."""
     if picture.ndim != 3 or picture.shape[2] not in (3, 4):
         raise ValueError(f"a picture has shape (h, w, 3) or (h, w, 4), not {picture.shape}")
     channels = {name: picture[..., n] for n, name in enumerate("RGBA"[: picture.shape[2]])}
@@ -108,12 +108,12 @@ def metadata(path: Path) -> dict[str, str]:
 
 
 def read_picture(path: Path) -> np.ndarray:
-    """The linear picture (h, w, 3) float32 of an EXR file with channels R, G, B. Raises `BadInput`."""
+    """The linear picture of an EXR file with R, G, B: (h, w, 3) float32, (h, w, 4) with A too. Raises `BadInput`."""
     channels = read(path)
     missing = [c for c in "RGB" if c not in channels]
     if missing:
         raise BadInput(path, "", f"no channel {', '.join(missing)}; the file holds: {', '.join(channels)}")
-    return np.stack([channels[c] for c in "RGB"], axis=-1)
+    return np.stack([channels[c] for c in "RGBA" if c in channels], axis=-1)
 
 
 def write_field(path: Path, field: Field, *, half: bool = False,

@@ -21,6 +21,7 @@ from pipeline.files import sandbox
 Window = tuple[float, float, float, float]
 """West, south, east, north; degrees."""
 
+POLAR = 85.0  # degrees: towards a pole what moves to the east would become infinitely fast on a map
 HUGE = 1e30  # floats beyond it are fill values, said or not: those of the library are about 1e37
 FILLS = {"i2": -32767, "i4": -2147483647}  # the library's, where the file says none
 NAMES = {"latitude": ("lat", "nav_lat"), "longitude": ("lon", "nav_lon")}
@@ -39,6 +40,7 @@ class Currents:
     latitude   (Y,) float64, degrees, ascending
     longitude  (X,) float64, degrees, ascending; those all round the globe go on beyond their seam
     window     what was asked for, or all there is; latitude and longitude reach a little beyond it
+    unit       the file's unit of u, as it is spelled there; "" if it says none
     """
 
     u: np.ndarray
@@ -47,28 +49,42 @@ class Currents:
     latitude: np.ndarray
     longitude: np.ndarray
     window: Window
+    unit: str
 
     def on(self, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """On the cells `shape` (Y', X'): (u, v) as (T, Y', X', 2) float32, and the share of each cell that has values
-        at all times, (Y', X') float32; where it is below a half, (u, v) is 0.
+        """On the cells `shape` (Y', X'): how fast places move on a map where a degree is as long in both directions,
+        (T, Y', X', 2) float32, and the share of each cell that has values at all times, (Y', X') float32; where it is
+        below a half, the velocity is 0.
 
-        A degree is as long in both directions. Of the window the cells cover the largest part of their proportions, in
-        its middle. Bilinear between what has values; means where the cells are the larger ones.
+        The velocity is (u / cos φ, v), φ the latitude, in the file's unit at the equator: what moves to the east passes
+        more degrees where they are shorter. Bilinear between what has values; means where the cells are larger.
         """
+        y, x = self.places(shape)
+        known: Any = ~self.missing.any(axis=0)
+        share = _bilinear(known.astype(np.float64), self.latitude, self.longitude, y, x)
+        there = share >= 0.5
+        values = np.zeros((len(self.u), *shape, 2), np.float32)
+        for moment, components in enumerate(zip(self.u, self.v, strict=True)):
+            for axis, component in enumerate(components):
+                sums = _bilinear(np.where(known, component, 0), self.latitude, self.longitude, y, x)
+                values[moment, ..., axis] = np.where(there, sums / np.where(there, share, 1), 0)
+        values[..., 0] /= shrunk(y)[:, None]
+        return values, share.astype(np.float32)
+
+    def places(self, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """Latitudes (Y',) and longitudes (X',) of the cells `shape` (Y', X'), degrees: of the window they cover the
+        largest part of their proportions, in its middle, a degree as long in both directions."""
         rows, columns = shape
         west, south, east, north = self.window
         degree = min((east - west) / columns, (north - south) / rows)
         x: np.ndarray = (west + east) / 2 + degree * (np.arange(columns) - (columns - 1) / 2)
         y: np.ndarray = (south + north) / 2 + degree * (np.arange(rows) - (rows - 1) / 2)
-        known: Any = ~self.missing.any(axis=0)
-        share = _bilinear(known.astype(np.float64), self.latitude, self.longitude, y, x)
-        there = share >= 0.5
-        values = np.zeros((len(self.u), rows, columns, 2), np.float32)
-        for moment, components in enumerate(zip(self.u, self.v, strict=True)):
-            for axis, component in enumerate(components):
-                sums = _bilinear(np.where(known, component, 0), self.latitude, self.longitude, y, x)
-                values[moment, ..., axis] = np.where(there, sums / np.where(there, share, 1), 0)
-        return values, share.astype(np.float32)
+        return y, x
+
+
+def shrunk(latitude: np.ndarray) -> np.ndarray:
+    """Length of a degree of longitude over that of one at the equator, float32; from POLAR on it shrinks no more."""
+    return np.cos(np.radians(np.minimum(np.abs(latitude), POLAR))).astype(np.float32)
 
 
 def _bilinear(values: np.ndarray, latitude: np.ndarray, longitude: np.ndarray, y: np.ndarray, x: np.ndarray,
@@ -206,7 +222,7 @@ def _currents(variables: dict[str, _Variable], u: str, v: str, first: int, last:
         raise _Refused("window" if window else "file", "no place has values of both at all time steps")
     return {"u": np.where(missing, np.float32(0), components[0][0]),
             "v": np.where(missing, np.float32(0), components[1][0]), "missing": missing,
-            "latitude": latitude[rows], "longitude": longitude, "window": list(whole)}
+            "latitude": latitude[rows], "longitude": longitude, "window": list(whole), "unit": _said(one, "units")}
 
 
 def _spelled(variable: _Variable) -> str:
@@ -215,8 +231,12 @@ def _spelled(variable: _Variable) -> str:
 
 
 def _text(variable: _Variable, attribute: str) -> str:
+    return _said(variable, attribute).lower()
+
+
+def _said(variable: _Variable, attribute: str) -> str:
     value = variable.attributes.get(attribute, "")
-    return (value.decode(errors="replace") if isinstance(value, bytes) else str(value)).strip().lower()
+    return (value.decode(errors="replace") if isinstance(value, bytes) else str(value)).strip()
 
 
 def _coordinate(variables: dict[str, _Variable], field: _Variable, what: str) -> _Variable:

@@ -1,10 +1,13 @@
-"""8-bit PNG files, and what OpenImageIO does with pictures: resize, FLIP.
+"""8-bit PNG files, and what OpenImageIO does with pictures: read a user's, resize, FLIP.
 
-A picture is (h, w, 3), top row first, sRGB. Grey values that become a field are (Y, X), lowest row first.
+A picture is (h, w, 3), top row first, sRGB, but what `read_coloured` gives. Grey values that become a field are (Y, X),
+lowest row first.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +62,15 @@ def _first_line(text: str) -> str:
 
 def _pixels(path: Path) -> dict[str, Any]:
     """The pixels (h, w, channels) as stored, in uint8 or uint16; ValueError if not all of them are there."""
+    pixels, _ = _decoded(path, {"uint16": "uint16"}, "uint8")
+    return {"pixels": pixels}
+
+
+def _decoded(path: Path, types: Mapping[str, str], otherwise: str) -> tuple[np.ndarray, Any]:
+    """The pixels (h, w, channels) and what the file says of them; `types`: in which type to take each that is stored.
+
+    Raises ValueError if it is no picture, too large, or not all there.
+    """
     import OpenImageIO as oiio
 
     hints = oiio.ImageSpec()
@@ -69,12 +81,26 @@ def _pixels(path: Path) -> dict[str, Any]:
     spec = source.spec()
     if max(spec.width, spec.height) > LARGEST:
         raise ValueError(f"{spec.width} x {spec.height} pixels; the largest side read is {LARGEST}")
-    pixels = source.read_image("uint16" if spec.format.basetype == oiio.UINT16 else "uint8")
+    pixels = source.read_image(types.get(str(spec.format), otherwise))
     error = source.geterror()
     source.close()
     if pixels is None or error:
         raise ValueError(f"damaged or cut short ({_first_line(error)})")
-    return {"pixels": np.asarray(pixels)}
+    return np.asarray(pixels), spec
+
+
+def _coloured(path: Path) -> dict[str, Any]:
+    """Runs in the child: channels (h, w, 1, 2, 3 or 4), alpha last, in uint8, uint16 or float32; and whether colours
+    are multiplied by alpha."""
+    floats = dict.fromkeys(("half", "float", "double"), "float")
+    pixels, spec = _decoded(path, {"uint8": "uint8", **floats}, "uint16")
+    names = list(spec.channelnames)
+    colours = next((wanted for wanted in (["R", "G", "B"], ["Y"]) if set(wanted) <= set(names)), [])
+    if not colours:
+        raise ValueError(f"no channels R, G, B or Y; the file holds: {', '.join(names)}")
+    taken = [names.index(name) for name in colours] + ([spec.alpha_channel] if spec.alpha_channel >= 0 else [])
+    return {"pixels": np.ascontiguousarray(pixels[..., taken]),
+            "multiplied": not spec.get_int_attribute("oiio:UnassociatedAlpha")}
 
 
 def read(path: Path) -> np.ndarray:
@@ -102,6 +128,45 @@ def read_foreign(path: Path, key: str) -> np.ndarray:
         raise BadInput(path, key, str(error)) from error
 
 
+@dataclass(frozen=True, eq=False)
+class Coloured:
+    """A user's picture of any depth, top row first.
+
+    colour     (h, w, 3) float32, not multiplied by alpha
+    alpha      (h, w) float32, 0 to 1; None where the file has none
+    is_linear  whether the colours are linear light, of which some may be above 1 or below 0; else sRGB, 0 to 1
+    """
+
+    colour: np.ndarray
+    alpha: np.ndarray | None
+    is_linear: bool
+
+
+def read_coloured(path: Path, key: str) -> Coloured:
+    """A user's picture: integers, of 8 or 16 bits, are sRGB; floats are linear light.
+
+    Where the file's colours are multiplied by alpha, as in EXR, they are divided by it, and 0 where it is 0. Read in a
+    child process; `key` is the scene's, for the error. Raises `BadInput` if it is missing, damaged, cut short, or holds
+    NaN or infinity.
+    """
+    found = sandbox.read(_coloured, path, key)
+    pixels = found["pixels"]
+    is_linear = pixels.dtype.kind == "f"
+    if is_linear and not np.isfinite(pixels).all():
+        raise BadInput(path, key, "holds NaN or infinity")
+    values = pixels if is_linear else pixels.astype(np.float32) / np.float32(np.iinfo(pixels.dtype).max)
+    alpha = None
+    if values.shape[2] in (2, 4):
+        alpha = np.clip(values[..., -1], 0, 1)
+        values = values[..., :-1]
+        if found["multiplied"]:
+            values = values / np.where(alpha > 0, alpha, 1)[..., None] * (alpha > 0)[..., None]
+    if not is_linear:
+        values = np.minimum(values, 1)
+    colour = np.ascontiguousarray(np.broadcast_to(values, (*values.shape[:2], 3)), np.float32)
+    return Coloured(colour, alpha, is_linear)
+
+
 def read_grey(path: Path, key: str) -> np.ndarray:
     """The grey values (Y, X) float32, 0 to 1, lowest row first, of a user's picture; see `read_foreign`."""
     return np.ascontiguousarray((read_foreign(path, key) @ LUMA)[::-1])
@@ -120,7 +185,7 @@ def _picture(stored: np.ndarray) -> np.ndarray:
 
 
 def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The picture (h, w, 3) resampled to (height, width, 3) float32: Blackman-Harris up, Lanczos 3 down."""
+    """The picture (h, w, C) resampled to (height, width, C) float32: Blackman-Harris up, Lanczos 3 down."""
     import OpenImageIO as oiio
 
     source = oiio.ImageBuf(np.ascontiguousarray(picture, dtype=np.float32))

@@ -18,6 +18,7 @@ import contextlib
 import hashlib
 import re
 from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -339,6 +340,37 @@ def geometry(path: Path, prim: str) -> tuple[np.ndarray, list[tuple[int, ...]], 
         vertices = np.stack([vertices[..., 0], vertices[..., 2], -vertices[..., 1]], axis=-1)
     with np.errstate(over="ignore"):
         return vertices.astype(np.float32), lines, faces, float(stage.GetFramesPerSecond())
+
+
+def surface(path: Path, primvar: str) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """The meshes of a USD file: vertices (N, 3) float64, y up, of its first frame, and triangles (M, 3) int64; and the
+    vectors (N, 3) that a primvar of this name, of type vector3f[] or the like, has at the vertices: None without a name
+    or where a mesh has none.
+
+    Runs in a child process (`sandbox`). Raises ValueError as `geometry` does, and for vectors that are not as many as
+    the vertices.
+    """
+    from pxr import Usd, UsdGeom
+
+    vertices, _, polygons, _ = geometry(path, "/")
+    faces = [(face[0], one, other) for face in polygons for one, other in pairwise(face[1:])]
+    stage = Usd.Stage.Open(str(path))
+    parts: list[np.ndarray] = []
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+        if prim.IsA(UsdGeom.Mesh) and primvar:
+            count = len(UsdGeom.Mesh(prim).GetPointsAttr().Get(Usd.TimeCode.EarliestTime()) or ())
+            value = UsdGeom.PrimvarsAPI(prim).GetPrimvar(primvar)
+            if not value:
+                return vertices[0].astype(np.float64), np.array(faces).reshape(-1, 3), None
+            vectors = np.asarray(value.ComputeFlattened(Usd.TimeCode.EarliestTime()), np.float64)
+            if vectors.shape != (count, 3):
+                raise ValueError(f"{prim.GetPath()} has {count} vertices, and {primvar} is of shape {vectors.shape}")
+            turn = np.array(UsdGeom.XformCache(Usd.TimeCode.EarliestTime()).GetLocalToWorldTransform(prim))
+            parts.append(vectors @ turn[:3, :3])
+    found = np.concatenate(parts) if parts else None
+    if found is not None and UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
+        found = np.stack([found[:, 0], found[:, 2], -found[:, 1]], axis=-1)
+    return vertices[0].astype(np.float64), np.array(faces).reshape(-1, 3), found
 
 
 def _times(stage: Any, prims: list[Any]) -> list[float]:

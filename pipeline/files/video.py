@@ -1,8 +1,8 @@
-"""H.264 in MP4, by PyAV: a figure's animation, and clips whose motion becomes an exemplar."""
+"""H.264 in MP4 and animated WebP, by PyAV: a figure's animation; and clips whose motion is measured."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from itertools import chain
 from pathlib import Path
@@ -15,6 +15,8 @@ from pipeline.files import atomic, sandbox
 from pipeline.files.pictures import LUMA, as_bytes
 
 MOST_FRAMES = 1000  # of a user's clip
+MILLISECOND = Fraction(1, 1000)  # WebP's unit of time
+WEBP_QUALITY = 90  # of 100: no blocks are seen at full size
 _FORMAT = {"movflags": "+faststart", "fflags": "+bitexact"}
 # mbtree: x264's AVX-512 code for it reads beside its rows, and makes other bytes from run to run
 _CODEC = {"preset": "slow", "tune": "animation", "x264-params": "mbtree=0"}
@@ -27,25 +29,59 @@ def write(path: Path, frames: Iterable[np.ndarray], fps: float, *, crf: int = 16
     twice. One thread: the same frames give the same bytes. crf: 0 is lossless, 16 looks like it, 23 is small.
     Raises ValueError for no frame, another size, or crf outside 0 to 51; `StorageFailed` if the disk is full.
     """
-    import av
-
     if not 0 <= crf <= 51:
         raise ValueError(f"crf is 0 to 51, not {crf}")
+    return _written(path, frames, "H.264", lambda file, pictures, shape: _encode(file, pictures, shape, fps, crf),
+                    lambda file, count: _counted(file) == count)
+
+
+def write_webp(path: Path, frames: Iterable[np.ndarray], fps: float) -> int:
+    """Encode the same pictures as animated WebP that repeats without end; returns how many there were.
+
+    Lossy, at a quality that looks clean; of any size up to 16383 pixels a side. A frame begins within half a
+    millisecond of its time, the format's unit being one; the last stands as long as the others do on the whole. A
+    picture that is the one before it lets that stand longer; if all are one, the file is a still. One thread: the same
+    frames give the same bytes. Raises ValueError for no frame or another size, `StorageFailed` if libwebp refuses or
+    the disk is full.
+    """
+    rate = _rate(fps)
+    return _written(path, frames, "WebP", lambda file, pictures, shape: _encode_webp(file, pictures, shape, rate),
+                    lambda file, count: _stands(file, count / rate))
+
+
+def _written(path: Path, frames: Iterable[np.ndarray], name: str,
+             encode: Callable[[Path, Iterable[np.ndarray], tuple[int, ...]], int],
+             is_whole: Callable[[Path, int], bool]) -> int:
+    """Encode `frames` beside `path`, read back what was written, and put it in place; how many there were."""
+    import av
+
     pictures = iter(frames)
     first = next(pictures, None)
     if first is None:
         raise ValueError("a video has at least one frame")
     with atomic.replacing(path) as temporary:
         try:
-            count = _encode(temporary, chain([first], pictures), first.shape, fps, crf)
-            whole = _counted(temporary) == count
+            count = encode(temporary, chain([first], pictures), first.shape)
+            whole = is_whole(temporary, count)
         except av.error.FFmpegError as error:
             if isinstance(error, OSError) and error.errno:
                 raise atomic.storage_failure(path, error) from error
-            raise StorageFailed(path, f"H.264: {error}") from error
+            raise StorageFailed(path, f"{name}: {error}") from error
         if not whole:
             raise StorageFailed(path, f"does not hold its {count} frames; is the disk full?")
     return count
+
+
+def _rate(fps: float) -> Fraction:
+    return Fraction(fps).limit_denominator(1001)
+
+
+def _alike(pictures: Iterable[np.ndarray], shape: tuple[int, ...]) -> Iterable[np.ndarray]:
+    """The pictures as bytes. Raises ValueError for one of another shape."""
+    for number, picture in enumerate(pictures, start=1):
+        if picture.shape != shape:
+            raise ValueError(f"frame {number} has shape {picture.shape}, the first {shape}")
+        yield as_bytes(picture)
 
 
 def _encode(path: Path, pictures: Iterable[np.ndarray], shape: tuple[int, ...], fps: float, crf: int) -> int:
@@ -57,17 +93,16 @@ def _encode(path: Path, pictures: Iterable[np.ndarray], shape: tuple[int, ...], 
     count = 0
     with av.open(str(path), "w", format="mp4", options=_FORMAT) as container:
         options = {**_CODEC, "crf": str(crf)}
-        stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001), options=options)
+        stream = container.add_stream("libx264", rate=_rate(fps), options=options)
         stream.pix_fmt = "yuv420p"
         stream.width, stream.height = width + width % 2, height + height % 2
         stream.thread_count = 1
         context = stream.codec_context
         context.colorspace, context.color_range = Colorspace.ITU709, ColorRange.MPEG
         context.color_primaries = context.color_trc = 1  # Rec.709
-        for count, picture in enumerate(pictures, start=1):
-            if picture.shape != shape:
-                raise ValueError(f"frame {count} has shape {picture.shape}, the first {shape}")
-            frame = av.VideoFrame.from_ndarray(np.pad(as_bytes(picture), odd, mode="edge"), format="rgb24")
+        for picture in _alike(pictures, shape):
+            count += 1
+            frame = av.VideoFrame.from_ndarray(np.pad(picture, odd, mode="edge"), format="rgb24")
             container.mux(stream.encode(frame.reformat(
                 format="yuv420p", dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG)))
         container.mux(stream.encode())
@@ -80,6 +115,43 @@ def _counted(path: Path) -> int:
 
     with av.open(str(path)) as container:
         return sum(packet.size > 0 for packet in container.demux(video=0))
+
+
+def _encode_webp(path: Path, pictures: Iterable[np.ndarray], shape: tuple[int, ...], rate: Fraction) -> int:
+    import av
+
+    count = 0
+    with av.open(str(path), "w", format="webp", options={"loop": "0"}) as container:
+        stream = container.add_stream("libwebp_anim", rate=rate, options={"quality": str(WEBP_QUALITY)})
+        stream.pix_fmt = "bgra"
+        stream.height, stream.width, _ = shape
+        stream.thread_count = 1
+        stream.codec_context.time_base = MILLISECOND
+        for picture in _alike(pictures, shape):
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="bgra")
+            start, end = (round(1000 * (count + shown) / rate) for shown in (0, 1))
+            frame.time_base, frame.pts, frame.duration = MILLISECOND, start, end - start
+            container.mux(stream.encode(frame))
+            count += 1
+        container.mux(stream.encode())
+    return count
+
+
+def _stands(path: Path, seconds: Fraction) -> bool:
+    """Whether a WebP is whole, and its frames together stand so long, within 2 ms; a still, as long as one likes.
+
+    Read chunk by chunk (RIFF), since FFmpeg does not decode animated WebP.
+    """
+    content = path.read_bytes()
+    if content[:4] + content[8:12] != b"RIFFWEBP" or int.from_bytes(content[4:8], "little") + 8 != len(content):
+        return False
+    times, at = [], 12
+    while at < len(content):
+        size = int.from_bytes(content[at + 4:at + 8], "little")
+        if content[at:at + 4] == b"ANMF":
+            times.append(int.from_bytes(content[at + 20:at + 23], "little"))
+        at += 8 + size + size % 2
+    return at == len(content) and (not times or abs(sum(times) - 1000 * seconds) <= 2)
 
 
 def _frames(path: Path) -> dict[str, Any]:

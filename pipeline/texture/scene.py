@@ -9,7 +9,9 @@ from pydantic import Field, Strict
 from pipeline.build.method import Faults
 from pipeline.flow import Coarse, Obstacle
 from pipeline.tables import key, listed
+from pipeline.texture.looks import CeramicRender
 from pipeline.texture.samples import Sample
+from pipeline.texture.surfaces import Surface
 from pipeline.texture.tables import Carry, Figure, Paper, Texture, TextureScene
 
 
@@ -17,13 +19,40 @@ class Scene(TextureScene):
     """A scene of a moving texture: keys above the first table."""
 
     sample: Sample = Field(discriminator="kind")
-    coarse: Coarse = Field(discriminator="kind")
+    coarse: Annotated[Coarse, Field(discriminator="kind")] | None = key(
+        "the flow of a texture in the plane; exactly one of [coarse] and [surface] is given", None)
+    surface: Surface | None = key("the surface that the texture lies on", None)
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = key(
         "where there is no texture: solids, an array of tables [[obstacles]]", (), max_length=64)
     texture: Texture = Texture()
     carry: Carry = Carry()
     paper: Paper = Paper()
+    render: CeramicRender = CeramicRender(kind="ceramic")
     figure: Figure = Figure()
+
+
+def ground_fits(scene: Scene) -> Faults:
+    """Check: a plane with a flow, or a surface, and what goes with each."""
+    texture, figure = scene.texture, scene.figure
+    if scene.surface is None:
+        if scene.coarse is None:
+            yield "coarse", "is missing; so is [surface], the other ground of a texture"
+        return
+    if scene.coarse is not None:
+        yield "coarse", "is of a texture in the plane, and there is a [surface]"
+    if scene.obstacles:
+        yield "obstacles", "are of a texture in the plane, and there is a [surface]"
+    if texture.method != "carry":
+        yield "texture.method", f'"{texture.method}" is of a texture in the plane; on a [surface] it is "carry"'
+    for name, given in (("texture.maps", texture.maps), ("texture.loop", texture.loop),
+                        ("texture.divergence_free", texture.divergence_free), ("figure.zoom", figure.zoom),
+                        ("figure.overlay", figure.overlay != "none")):
+        if given:
+            yield name, "is of a texture in the plane, and there is a [surface]"
+    for panel in figure.panels:
+        if panel not in ("sample", "result"):
+            yield "figure.panels", f'there is no "{panel}" with a [surface]'
+    yield from scene.surface.faults()
 
 
 def texture_fits(scene: Scene) -> Faults:

@@ -1,7 +1,7 @@
 """The tables of wang05's synthesis, and what a scene of a moving texture is to them.
 
-A key's section (§) is wang05's. The tables [sample], [coarse] and [[obstacles]] stand with what they do: `samples`,
-`pipeline.flow`; `scene` puts all of them together.
+A key's section (§) is wang05's. The tables [sample], [surface], [render], [coarse] and [[obstacles]] stand with what
+they do: `samples`, `surfaces`, `looks`, `pipeline.flow`; `scene` puts all of them together.
 """
 
 from __future__ import annotations
@@ -21,14 +21,20 @@ Reach = Annotated[float, Field(ge=6, le=40)]
 class Texture(Table):
     """The moving texture."""
 
-    size: Annotated[tuple[Cells, Cells], Strict(False)] = key("columns and rows of the picture", (512, 512), "pixels")
+    size: Annotated[tuple[Cells, Cells], Strict(False)] = key(
+        "columns and rows of the picture; of a surface, of the texture that holds all its triangles", (512, 512),
+        "pixels")
     method: Literal["carry", "paper", "pixels"] = key(
         "\"carry\": long-lived patches that carry coordinates into the sample; \"paper\": the paper's, which carries "
         "colours; \"pixels\": the paper's first frame, its pixels moved one by one (figure 3)", "carry")
     speed: Literal["limited", "normalized"] = key(
-        "the flow's own, within slowest and fastest (§3), or the same everywhere (figures 8, 9 and 11)", "limited")
+        "the flow's own, within slowest and fastest (§3), or the same everywhere (figures 8, 9 and 11); on a surface "
+        "pixels are the sample's, and the field is scaled so that its largest speed is fastest", "limited")
     slowest: float = key("least speed, with speed = \"limited\"", 0.3, "pixels per frame", ge=0, le=100)
     fastest: float = key("largest speed, with speed = \"limited\"", 2.2, "pixels per frame", gt=0, le=100)
+    divergence_free: bool = key(
+        "follow the coarse motion's part that is free of divergence (Helmholtz-Hodge), which goes round obstacles and "
+        "missing values: where a flow spreads or gathers, a texture is torn or crushed", False)
     maps: bool = key(
         "with method = \"carry\", write UV maps too, out/X/fields/uv.0001.exr …: for each pixel the places in the "
         "sample and the weights of its two strongest patches, for other programs", False)
@@ -46,11 +52,12 @@ class Carry(Table):
         "least and largest radius of a patch; where the flow bends more it is smaller", (6.0, 20.0), "pixels")
     elongation: float = key("length of a patch along the flow over its width", 1.5, ge=1, le=4)
     usage: float = key("how strongly places of the sample that are in use are avoided; 0: not at all", 0.6, ge=0, le=10)
-    growth: int = key("frames in which a new patch grows", 8, "frames", ge=1, le=1000)
+    growth: int = key("frames in which a new patch grows", 12, "frames", ge=1, le=1000)
     blend: Annotated[float, Field(ge=0, le=1)] | Literal["auto"] = key(
         "share of the blend that keeps the variance; \"auto\": so that the first frame has the sample's contrast",
         "auto")
-    repair: float = key("share of the patches whose seams are tested in a frame", 0.125, ge=0, le=1)
+    repair: float = key("share of the patches whose seams are tested in a frame; on a surface none are", 0.125, ge=0,
+                        le=1)
 
     def settings(self) -> Any:
         """As synth.texture.carry takes them."""
@@ -99,9 +106,15 @@ class Figure(FigureTable):
     moments: Annotated[tuple[Annotated[int, Field(ge=1, le=100000)], ...], Strict(False)] = key(
         "frames at which the still shows the result (figure 8: 1, 30, 70, 100); none: figure.frame alone", (), "frames",
         max_length=16)
+    overlay: Literal["none", "speed"] = key(
+        "\"speed\": the result in colours that tell how fast L is, before texture.speed changes that; a "
+        "legend is the last panel", "none")
     zoom: Annotated[tuple[Share01, Share01, Share], Strict(False)] | None = key(
         "x and y of the middle and edge of a square of the result that is enlarged in its corner (figure 7); none: no "
         "such view", None, "widths of the picture")
+
+    def shown(self, frames: int) -> list[int]:
+        return sorted({*super().shown(frames), *self.moments})
 
 
 class TextureScene(SceneInFlow):
@@ -109,6 +122,8 @@ class TextureScene(SceneInFlow):
 
     if TYPE_CHECKING:
         sample: Any
+        surface: Any
+        render: Any
         texture: Texture
         carry: Carry
         paper: Paper

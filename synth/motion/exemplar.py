@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from synth.motion import strokes
+from synth.optical_flow import optical_flow, tones
 
 Array = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -240,26 +241,14 @@ def from_clip(frames: Iterable[ArrayLike], size: int) -> Array:
     """The mean optical flow of a clip, made toroidal (ma09 §1, "captured data").
 
     frames: grey images (Y, X) of one size, bottom row first, uint8 or float from 0 to 1, two or more.
-    The flow between neighbours is OpenCV's dense inverse search (Kroeger 2016).
+    The flow between neighbours is `synth.optical_flow`.
 
     Returns (size, size, 2) float32. Raises ValueError for fewer than two frames, frames of different or too
     small a size, non-finite values, or a clip in which nothing moves.
     """
-    cv2 = strokes.opencv()
-
-    flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     total: Any = 0.0
-    previous = None
-    for number, frame in enumerate(frames):
-        tone = _checked(_tones(frame), 2, f"frame {number + 1} of the clip")
-        grey = np.ascontiguousarray(np.rint(np.clip(tone, 0, 1) * 255), dtype=np.uint8)
-        if previous is not None:
-            if grey.shape != previous.shape:
-                raise ValueError(f"frame {number + 1} of the clip is not of the size of the one before it")
-            total = total + flow.calc(previous, grey, None)  # rows go up, so its y component does too
-        previous = grey
-    if np.ndim(total) == 0:
-        raise ValueError("a clip needs two frames or more to show motion")
+    for flow in optical_flow(frames):
+        total = total + flow
     return from_field(total, size, toroidal=True)
 
 
@@ -275,9 +264,9 @@ def from_drawing(image: ArrayLike, size: int) -> Array:
     Returns (size, size, 2) float32. Raises ValueError for an image without strokes, non-finite or tiny.
     """
     _check_size(size)
-    tones = _tones(image)
-    tones = _checked(tones[..., None] if tones.ndim == 2 else tones, 3, "the drawing")
-    lines, half_width = strokes.traced(*strokes.ink(tones))
+    drawn = tones(image)
+    drawn = _checked(drawn[..., None] if drawn.ndim == 2 else drawn, 3, "the drawing")
+    lines, half_width = strokes.traced(*strokes.ink(drawn))
     if not lines:
         raise ValueError("the drawing is blank: no stroke is found in it")
     return _unit(strokes.flow_along(lines, size, max(strokes.STROKE_REACH, 2 * half_width)))
@@ -295,13 +284,6 @@ def from_svg(text: str, size: int) -> Array:
     """
     _check_size(size)
     return _unit(strokes.flow_along(strokes.svg_strokes(text), size, strokes.STROKE_REACH))
-
-
-def _tones(image: ArrayLike) -> Floats:
-    """Integer images to 0 … 1, others as they are; float64."""
-    array = np.asarray(image)
-    top = np.iinfo(array.dtype).max if np.issubdtype(array.dtype, np.integer) else 1
-    return array.astype(np.float64) / top
 
 
 def _checked(values: ArrayLike, dimensions: int, name: str) -> Floats:

@@ -9,8 +9,15 @@ In the order data passes through them:
     cells       squares over which direction or velocity differ little, for the paper's method (§2.1, §2.2.1)
     paper       the paper's method: colours that are carried in cells (§2)
     patches     what patches of a sample cover and show, and which place of it continues a picture
+    anchors     which places of the sample patches may take
     carry       ours: places in the sample that are carried in patches
     loop        carry with lives of patches that repeat: the last frame leads into the first
+    mesh        triangle meshes: tangent fields on them, motion over them
+    shapes      surfaces by procedure, fields on surfaces
+    charts      each patch's surroundings on a surface, laid into the plane
+    atlas       a place in one picture for each triangle
+    bake        what patches on a surface show
+    surface     carry on a surface
     measures    how near a frame is to its sample, and how well it moves
 
 Notation:

@@ -16,11 +16,11 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from synth import opencl
 from synth.texture import flow, measures
+from synth.texture.anchors import Anchors
 from synth.texture.patches import (
     AX,
     AY,
@@ -36,7 +36,6 @@ from synth.texture.patches import (
     NEAR,
     NEVER,
     RADIUS,
-    SPREAD,
     STEEP,
     TILE,
     TX,
@@ -54,14 +53,16 @@ GRID = float(1 << 20)
 """Centres are multiples of 1 / GRID pixels, so that a flow of whole pixels moves them without rounding."""
 TURN = 0.5
 """A patch turns by no more than this from its centre to its edge: bends are at most TURN / r, r at most TURN / |∇θ|."""
+SWAY = 2.0
+"""Pixels by which turning, or bending, may move the picture at a patch's edge in a frame. A patch whose radius goes by
+the flow's curvature needs TURN times the speed: 1.1 at 2.2 pixels a frame. Where the direction leaps, in saddles and
+sinks, patches of the least radius would turn by any angle at once, and pop; with 1 they would lag behind the flow."""
 INFLOW = 12.0
 """Pixels outside the picture in which patches are born, so that what flows in has grown when it is seen."""
 FIRST_SITES = 2
 """Pixels between the places that are tried for a birth in the first frame; later TILE / 4."""
 FEWEST = 8
 """Places with a picture that a newborn must have to be matched; with fewer its anchor is drawn at random."""
-LIVELY = 8.0
-"""σ, in pixels, of the round in which the sample's variance counts."""
 RING = (0.6, 0.8)
 """Radii between which a patch is compared with its neighbours."""
 BESIDE = 0.5
@@ -82,7 +83,9 @@ class Settings:
     usage       how strongly places of the sample that are in use are avoided (λ): 0, not at all
     growth      frames in which a patch grows, or fades
     sharpness   of the seams: steepness per pixel of radius
-    head_start  what a patch without weight lacks, in squared radii
+    head_start  what a patch without weight lacks, in squared radii. A seam is 4 wide in steepness times these: where a
+                newborn grows as another fades, 2 · 20 · sharpness · head_start / growth = 1.3 of them change hands in a
+                frame. At 2.6 blocks of 16 pixels popped
     window      radii from its centre beyond which a patch shows nothing
     blend       share of the blend that preserves variance, 0..1; "auto": so that the first frame's gradient is the
                 sample's
@@ -95,10 +98,10 @@ class Settings:
     elongation: float = 1.5
     spacing: float = 1.0
     birth: float = 1.12
-    death: float = 0.55
+    death: float = 0.7
     usage: float = 0.6
-    growth: int = 8
-    sharpness: float = 0.4
+    growth: int = 12
+    sharpness: float = 0.3
     head_start: float = 1.3
     window: float = 1.7
     blend: float | Literal["auto"] = "auto"
@@ -224,6 +227,7 @@ class Synthesis:
             raise ValueError(f"a sample of {sample.shape[1]} x {sample.shape[0]} pixels has no room for a patch")
         self.radius = min(settings.radius[0], most), most
         self.painter = replace(painter, largest=most)
+        self.anchors = Anchors(self.painter, settings.usage, seed)
         self._tiled: tuple[State, Table, Lists] | None = None
 
     def frame(self, v: np.ndarray, state: State | None, mask: np.ndarray | None = None) -> State:
@@ -363,7 +367,7 @@ class Synthesis:
 
         1. Centres move by the midpoint rule, to the grid.
         2. What has faded, lies too far outside, or has left the mask is gone.
-        3. Axis, bend and radius are the flow's there; weights grow or fade.
+        3. Axis, bend and radius go over to the flow's there; weights grow or fade.
         """
         # 1. what a patch moves is rounded, not where it is: every patch of a uniform flow moves alike
         step = flow.midpoint(ground.v, state.centre) - state.centre
@@ -377,19 +381,26 @@ class Synthesis:
         # 3. turn
         now = replace(state, frame=state.frame + 1, centre=centre, weight=weight.astype(np.float32),
                       age=state.age + np.int32(1), mask=_kept(ground))
-        now = replace(chosen(now, stays), usage=self._used(state.usage, state.anchor[~stays], -1))
-        turned: dict[str, Any] = self._turned(now.centre, ground)
-        return replace(now, **turned)
+        now = replace(chosen(now, stays), usage=self.anchors.used(state.usage, state.anchor[~stays], -1))
+        return replace(now, **self._eased(now, self._turned(now.centre, ground)))
 
-    def _used(self, usage: np.ndarray, anchors: np.ndarray, change: int) -> np.ndarray:
-        """usage (H, W) with `change` added round each of anchors (M, 2)."""
-        usage = usage.copy()
-        height, width = usage.shape
-        for x, y in anchors.astype(np.int64):
-            low, left = max(y - SPREAD, 0), max(x - SPREAD, 0)
-            part = usage[low:min(y + SPREAD + 1, height), left:min(x + SPREAD + 1, width)]
-            part += change * _DISC[low - y + SPREAD:, left - x + SPREAD:][:part.shape[0], :part.shape[1]]
-        return usage
+    def _eased(self, now: State, turned: dict[str, np.ndarray]) -> dict[str, Any]:
+        """Axis, bend and radius as `_turned` gave them; axis and bend no farther from those of `now` than SWAY allows.
+
+        Only where the flow's direction leaps, in saddles and sinks or from frame to frame, do they lag behind.
+        """
+        radius = turned["radius"]
+        old, new = now.axis.astype(np.float64), turned["axis"].astype(np.float64)
+        angle = np.arctan2(old[:, 0] * new[:, 1] - old[:, 1] * new[:, 0], (old * new).sum(axis=1))
+        by = np.clip(angle, -SWAY / radius, SWAY / radius)
+        cos, sin = np.cos(by), np.sin(by)
+        behind = np.stack([old[:, 0] * cos - old[:, 1] * sin, old[:, 0] * sin + old[:, 1] * cos], axis=-1)
+        # a bend of κ moves what lies r away by κ r² / 2
+        most = (2 * SWAY / (radius * radius))[:, None]
+        limit = (np.float32(TURN) / radius)[:, None]
+        bend = np.clip(now.bend + np.clip(turned["bend"] - now.bend, -most, most), -limit, limit)
+        return {"axis": np.where((by == angle)[:, None], turned["axis"], behind.astype(np.float32)),
+                "bend": bend.astype(np.float32), "radius": radius}
 
     # 2. crowd
 
@@ -597,13 +608,13 @@ class Synthesis:
             turn = np.flatnonzero(rank[new] == number)
             query = Query(new[turn].astype(np.int32), without[turn], np.zeros(len(turn), np.int32), end[turn])
             wanted = painter.rectify(table, _part(lists, turn), query, rank, number, ground.open)
-            anchors = painter.match(wanted, query, radius[turn], self._dear(usage))
+            anchors = painter.match(wanted, query, radius[turn], self.anchors.dear(usage))
             there = wanted.get()[:, :len(places.radii), 1]
             few = (there * (np.arange(len(places.radii)) < query.end[:, None])).sum(axis=1) < FEWEST
             for k in np.flatnonzero(few):
-                anchors[k] = self._anywhere(now, int(query.who[k]))
+                anchors[k] = self.anchors.anywhere(radius[turn[k:k + 1]], now.frame, int(now.id[query.who[k]]))
             table.values[query.who[:, None], [AX, AY]] = anchors
-            usage = self._used(usage, anchors, 1)
+            usage = self.anchors.used(usage, anchors, 1)
         return replace(now, anchor=table.values[:, [AX, AY]].copy(), usage=usage)
 
     def _order(self, now: State, new: np.ndarray) -> np.ndarray:
@@ -624,30 +635,6 @@ class Synthesis:
             rounds[k] = 1 + rounds[earlier[starts[k]:starts[k + 1]]].max(initial=0)
         return rounds
 
-    def _dear(self, usage: np.ndarray) -> np.ndarray:
-        """By what share the error at each anchor counts more, or less if negative: (H, W) float32.
-
-        1. λ times the use of each place of the sample over the mean use.
-        2. Divided by how lively the sample is there: the least squares alone prefer its dull parts, since of two
-           pictures that have nothing in common the difference is the sum of their variances.
-        """
-        mean = usage.mean()
-        used = self.settings.usage * usage / mean if mean > 0 else np.zeros(usage.shape)
-        return ((1 + used) / self._lively - 1).astype(np.float32)
-
-    @cached_property
-    def _lively(self) -> np.ndarray:
-        """Variance of the sample round each pixel plus that of the whole, over twice the latter: (H, W) float64."""
-        picture = self.sample.luminance.astype(np.float64)
-        squared = (picture - picture.mean()) ** 2
-        return 0.5 + 0.5 * ndimage.gaussian_filter(squared, LIVELY, mode="mirror") / squared.mean()
-
-    def _anywhere(self, now: State, k: int) -> np.ndarray:
-        """An anchor at random for patch k."""
-        fits = np.argwhere(self.painter.room >= self.painter.needs(now.radius[k:k + 1])[0])
-        random = np.random.Philox(key=[self.seed, now.frame], counter=[0, 0, 0, 1 + int(now.id[k])])
-        return fits[np.random.Generator(random).integers(len(fits))][::-1]
-
     # 6. blend
 
     def _blended(self, now: State) -> State:
@@ -665,9 +652,6 @@ class Synthesis:
     @cached_property
     def _reference(self) -> measures.Reference:
         return measures.Reference(self.sample)
-
-
-_DISC = np.hypot(*np.mgrid[-SPREAD:SPREAD + 1, -SPREAD:SPREAD + 1]) <= SPREAD
 
 
 def _nearest(field: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -174,7 +174,7 @@ class Loop(carry.Synthesis):
         # 1. match
         for _ in range(LAPS):
             for frame, state in enumerate(states, start=1):
-                usage = self._used(usage, anchor[np.setdiff1d(before, state.id)], -1)
+                usage = self.anchors.used(usage, anchor[np.setdiff1d(before, state.id)], -1)
                 now = replace(state, usage=usage, anchor=anchor[state.id])
                 now.anchor[state.age == 0] = -1
                 now = self._matched(now, {}, ground(frame))

@@ -98,6 +98,17 @@ inline void place(float16 s, float16 m, global const float *restrict p, float2 t
     *y = fmax(last.y - fabs(last.y - j), 0.0f);
 }
 
+// Where (U, V) lies in a patch's axes (s, m): the inverse of its bend, by four steps.
+inline void unbent(float16 U, float16 V, global const float *restrict p, float16 *s, float16 *m) {
+    *s = U;
+    *m = V;
+    for (int step = 0; step < 4; step++) {
+        const float16 next = U - p[BEND_T] * *s * *m - 0.5f * p[BEND_N] * *m * *m;
+        *m = V + 0.5f * p[BEND_T] * *s * *s + p[BEND_N] * *s * *m;
+        *s = next;
+    }
+}
+
 // The enlarged sample, (rows, columns, COUNT) with 4 bytes a value, at places in pixels of the sample: bilinear.
 #define READ_(COUNT)                                                                                              \
     inline void read##COUNT(global const float *restrict sample, int columns, int rows, float16 x, float16 y,     \
@@ -170,49 +181,11 @@ kernel void draw(global const int *restrict starts, global const int *restrict m
                  global const float *restrict tones, const float blend, global const float *restrict clear,
                  const int2 size, global float *restrict picture) {
     TILED;
-    float16 nearest = (float16)(FARTHEST);
-    for (int k = first; k < end; k++) {
-        FROM_CENTRE;
-        float16 e = remoteness(s, m, p, p[BIAS]);
-        HIDE(e, e < nearest);
-        nearest = fmin(nearest, e);
-    }
-    float16 sum = (float16)(0.0f), squares = sum, power = sum, colour[CHANNELS];
-    for (int c = 0; c < CHANNELS; c++) colour[c] = sum;
-    for (int k = first; k < end; k++) {
-        FROM_CENTRE;
-        float16 e = remoteness(s, m, p, p[BIAS]);
-        if (!any(e < nearest + 4.0f)) continue;
-        HIDE(e, e < nearest + 4.0f);
-        const float16 w = weight(e - nearest);
-        float16 px, py, value[CHANNELS];
-        place(s, m, p, turn, last, &px, &py);
-        READ_COLOUR(CHANNELS)(sample, enlarged.x, enlarged.y, px, py, value);
-        sum += w;
-        squares += w * w;
-        for (int c = 0; c < CHANNELS; c++) {
-            const float16 beyond = value[c] - tones[c];
-            colour[c] += w * beyond;
-            power += w * (beyond * beyond);
-        }
-    }
-    const int16 covered = sum > 0.0f;
-    sum = select((float16)(1.0f), sum, covered);
-    squares = select((float16)(1.0f), squares, covered);
-    // how far the patches differ here, over what unlike ones would
-    float16 unlike = power / sum;
-    for (int c = 0; c < CHANNELS; c++) {
-        colour[c] /= sum;
-        unlike -= colour[c] * colour[c];
-    }
-    unlike = fmin(fmax(unlike * tones[3 * CHANNELS] / fmax(1.0f - squares / (sum * sum), 1e-6f), 0.0f), 1.0f);
-    const float16 gain = 1.0f + blend * unlike * (sum / sqrt(squares) - 1.0f);
+#include "texture/blend.h"
     float out[CHANNELS][16];
     int shown[16];
     vstore16(covered, 0, shown);
-    for (int c = 0; c < CHANNELS; c++)
-        vstore16(fmin(fmax(tones[c] + gain * colour[c], tones[CHANNELS + c]), tones[2 * CHANNELS + c]), 0,
-                 out[c]);
+    for (int c = 0; c < CHANNELS; c++) vstore16(colour[c], 0, out[c]);
     for (int l = 0; l < min(TILE, size.x - x); l++) {
 #if MASKED
         const bool show = shown[l] && clear[y * size.x + x + l] > 0.0f;
@@ -340,12 +313,8 @@ kernel void rectify(global const int *restrict who, global const int *restrict w
     global const float *restrict own = patches + who[q] * FIELDS;
     const int2 home = cells[who[q]];
     const float16 U = vload16(block, u), V = vload16(block, v);
-    float16 a = U, b = V;
-    for (int step = 0; step < 4; step++) {
-        const float16 next = U - own[BEND_T] * a * b - 0.5f * own[BEND_N] * b * b;
-        b = V + 0.5f * own[BEND_T] * a * a + own[BEND_N] * a * b;
-        a = next;
-    }
+    float16 a, b;
+    unbent(U, V, own, &a, &b);
     const float16 x = a * own[TX] - b * own[TY], y = a * own[TY] + b * own[TX];
     int16 visible = (int16)(-1);
 #if MASKED
@@ -371,24 +340,8 @@ kernel void rectify(global const int *restrict who, global const int *restrict w
 #else
 #define HIDE_PLACES(counts)
 #endif
-    float16 nearest = (float16)(FARTHEST);
-    for (int k = starts[q]; k < starts[q + 1]; k++) {
-        FROM_THIS;
-        HIDE_PLACES(e < nearest);
-        nearest = fmin(nearest, e);
-    }
-    float16 sum = (float16)(0.0f), total = sum;
-    for (int k = starts[q]; k < starts[q + 1]; k++) {
-        FROM_THIS;
-        if (!any(e < nearest + 4.0f)) continue;
-        HIDE_PLACES(e < nearest + 4.0f);
-        const float16 w = weight(e - nearest);
-        float16 px, py, value;
-        place(s, m, p, turn, last, &px, &py);
-        read1(sample, enlarged.x, enlarged.y, px, py, &value);
-        sum += w;
-        total += w * value;
-    }
+    const int first = starts[q], end = starts[q + 1];
+#include "texture/mean.h"
     const int16 any_there = (sum > 0.0f) & visible;
     sum = select((float16)(1.0f), sum, any_there);
     float values[16];

@@ -21,6 +21,7 @@ for each patch that has a share in one of 16 pixels.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -36,7 +37,7 @@ from synth.texture.sample import Sample
 
 TILE = 16
 FINE = 3
-"""The sample is enlarged so many times, by cubic interpolation, and then read by linear interpolation."""
+"""The sample is enlarged so many times, by a cubic spline, and then read by linear interpolation."""
 FX, FY, TX, TY, BEND_T, BEND_N, AX, AY, INVERSE, STEEP, BIAS, BEFORE, RADIUS, NEAR = range(14)
 """What the floats of a patch's table are; the kernels know them by the same names."""
 FIELDS = 16
@@ -199,16 +200,22 @@ class Painter:
     # the kernels
 
     def _program(self, open_: np.ndarray | None) -> opencl.Program:
-        return opencl.program(Path(__file__).with_suffix(".cl"), CHANNELS=self.colour.shape[2], FINE=FINE, TILE=TILE,
-                              MASKED=int(open_ is not None), FIELDS=FIELDS, REACH2=_literal(self.reach**2),
-                              ALONG=_literal(1 / self.elongation), ACROSS=_literal(self.elongation))
+        return self.program(Path(__file__).with_suffix(".cl"), masked=open_ is not None)
+
+    def program(self, source: Path, masked: bool = False, **defines: Any) -> opencl.Program:
+        """The kernels of `source`, which are those of patches.cl or include them."""
+        return opencl.program(source, CHANNELS=self.colour.shape[2], FINE=FINE, TILE=TILE,
+                              MASKED=int(masked), FIELDS=FIELDS, REACH2=_literal(self.reach**2),
+                              ALONG=_literal(1 / self.elongation), ACROSS=_literal(self.elongation), **defines)
 
     @cached_property
-    def _colour_on_device(self) -> tuple[Any, np.ndarray]:
+    def colour_on_device(self) -> tuple[Any, np.ndarray]:
+        """What is drawn, and its columns and rows."""
         return opencl.to_device(self.colour), np.array(self.colour.shape[1::-1], np.int32)
 
     @cached_property
-    def _luminance_on_device(self) -> tuple[Any, np.ndarray]:
+    def luminance_on_device(self) -> tuple[Any, np.ndarray]:
+        """What is matched, and its columns and rows."""
         return opencl.to_device(self.luminance), np.array(self.luminance.shape[1::-1], np.int32)
 
     def walls(self, open_: np.ndarray) -> Walls:
@@ -229,7 +236,7 @@ class Painter:
         """The picture (Y, X, 3) float32, linear light; `draw_reference` says what it is."""
         channels = self.colour.shape[2]
         out = opencl.empty((*self.shape, channels))
-        self._program(open_).draw(*self._over_pixels(), *_uploaded(lists), *_uploaded(table), *self._colour_on_device,
+        self._program(open_).draw(*self._over_pixels(), *_uploaded(lists), *_uploaded(table), *self.colour_on_device,
                                   self.turn, self.last, opencl.to_device(self.tones), np.float32(blend),
                                   *self._mask(open_), out)
         picture = out.get()
@@ -267,7 +274,7 @@ class Painter:
         self._program(open_).rectify((places.padded // 16, len(query.who)), (1, 1), *_uploaded(query),
                                      *places.on_device, *_uploaded(lists), opencl.to_device(rank), np.int32(below),
                                      *_uploaded(table),
-                                     *self._luminance_on_device, self.turn, self.last, *self._mask(open_), out)
+                                     *self.luminance_on_device, self.turn, self.last, *self._mask(open_), out)
         return out
 
     @cached_property
@@ -422,22 +429,25 @@ def _uploaded(arrays: Table | Lists | Query) -> tuple[Any, ...]:
 
 
 def enlarged(picture: np.ndarray) -> np.ndarray:
-    """picture (H, W, C) with FINE places a pixel: (FINE (H - 1) + 1, FINE (W - 1) + 1, C) float32, Catmull-Rom.
+    """picture (H, W, C) with FINE places a pixel: (FINE (H - 1) + 1, FINE (W - 1) + 1, C) float32, by the cubic spline
+    through its pixels, mirrored at its edges as `draw` mirrors it.
 
-    Every FINE-th place is a pixel of the picture; none is outside the picture's range.
+    Every FINE-th place is a pixel of the picture; none is outside the picture's range. A spline keeps fine detail alike
+    at all places between pixels; Catmull-Rom blurs it there, and a moving patch then flickers between sharp and soft.
     """
     values = picture.astype(np.float64)
     for axis in (0, 1):
         values = np.moveaxis(values, axis, 0)
-        padded = np.concatenate([values[:1], values, values[-1:]])
         n = len(values)
         fine = np.empty((FINE * (n - 1) + 1, *values.shape[1:]))
         fine[::FINE] = values
-        for k in range(1, FINE):
-            f = k / FINE
-            weights = (f * (-1 + f * (2 - f)) / 2, (2 + f * f * (3 * f - 5)) / 2, f * (1 + f * (4 - 3 * f)) / 2,
-                       f * f * (f - 1) / 2)
-            fine[k::FINE] = sum(w * padded[i:i + n - 1] for i, w in enumerate(weights))
+        if n > 1:
+            spline = ndimage.spline_filter1d(values, axis=0, mode="mirror")
+            padded = np.concatenate([spline[1:2], spline, spline[-2:-1]])
+            for k in range(1, FINE):
+                f = k / FINE
+                weights = ((1 - f)**3 / 6, (4 - 6 * f * f + 3 * f**3) / 6, (1 + 3 * f * (1 + f - f * f)) / 6, f**3 / 6)
+                fine[k::FINE] = sum(w * padded[i:i + n - 1] for i, w in enumerate(weights))
         values = np.moveaxis(fine, 0, axis)
     low, high = picture.min(axis=(0, 1)), picture.max(axis=(0, 1))
     return np.ascontiguousarray(np.clip(values, low, high), np.float32)
@@ -472,7 +482,8 @@ def sees_reference(open_: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.
     return clear
 
 
-def _remoteness(painter: Painter, s: np.ndarray, m: np.ndarray, p: np.ndarray, bias: np.ndarray) -> np.ndarray:
+def remoteness(painter: Painter, s: np.ndarray, m: np.ndarray, p: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """How remote places (s, m) in the axes of patch p (FIELDS,) are; NEVER out of reach."""
     along, across = np.float32(1 / painter.elongation), np.float32(painter.elongation)
     rho = (s * s * along + m * m * across) * p[INVERSE]
     t = rho * (np.float32(1) / np.float32(painter.reach**2))
@@ -481,12 +492,23 @@ def _remoteness(painter: Painter, s: np.ndarray, m: np.ndarray, p: np.ndarray, b
     return np.where(inside, p[STEEP] * rho + bias + t * t * (t * t) / left, NEVER)
 
 
-def _weight(behind: np.ndarray) -> np.ndarray:
+def weight(behind: np.ndarray) -> np.ndarray:
+    """The weight of a patch that is `behind` the nearest by so much."""
     left = np.maximum(np.float32(1) - np.float32(0.25) * behind, np.float32(0))
     return left * left * (left * left)
 
 
-def _place(painter: Painter, s: np.ndarray, m: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def unbent(U: np.ndarray, V: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where (U, V) lies in the axes (s, m) of a patch: the inverse of its bend, by four steps."""
+    s, m, half = U, V, np.float32(0.5)
+    for _ in range(4):
+        s, m = (U - p[BEND_T] * s * m - half * p[BEND_N] * m * m,
+                V + half * p[BEND_T] * s * s + p[BEND_N] * s * m)
+    return s, m
+
+
+def place(painter: Painter, s: np.ndarray, m: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The place in the sample that a patch shows at (s, m), pixels, folded back at its edges."""
     half, (cos, sin), last = np.float32(0.5), painter.turn, painter.last
     u = s + p[BEND_T] * s * m + half * p[BEND_N] * m * m
     v = m - half * p[BEND_T] * s * s - p[BEND_N] * s * m
@@ -495,7 +517,8 @@ def _place(painter: Painter, s: np.ndarray, m: np.ndarray, p: np.ndarray) -> tup
     return np.maximum(last[0] - np.abs(last[0] - i), zero), np.maximum(last[1] - np.abs(last[1] - j), zero)
 
 
-def _read(fine: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def read(fine: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The enlarged sample at places in pixels of the sample: bilinear."""
     fx, fy = x * np.float32(FINE), y * np.float32(FINE)
     i, j = np.minimum(fx.astype(np.int32), fine.shape[1] - 2), np.minimum(fy.astype(np.int32), fine.shape[0] - 2)
     u, v = (fx - i.astype(np.float32))[..., None], (fy - j.astype(np.float32))[..., None]
@@ -504,7 +527,7 @@ def _read(fine: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return low + v * (high - low)
 
 
-class _Pixels(NamedTuple):
+class Pixels(NamedTuple):
     """Of each patch that lies on some pixels: how remote it is there, and where they lie in its axes."""
 
     e: np.ndarray
@@ -512,19 +535,19 @@ class _Pixels(NamedTuple):
     m: np.ndarray
 
 
-def _on_pixels(painter: Painter, table: Table, open_: np.ndarray | None, when: int) -> list[_Pixels]:
+def _on_pixels(painter: Painter, table: Table, open_: np.ndarray | None, when: int) -> list[Pixels]:
     y, x = np.mgrid[:painter.shape[0], :painter.shape[1]]
     found = []
     for (cx, cy), p in zip(table.cells, table.values, strict=True):
         dx, dy = (x - cx).astype(np.float32) - p[FX], (y - cy).astype(np.float32) - p[FY]
         s, m = dx * p[TX] + dy * p[TY], dy * p[TX] - dx * p[TY]
-        e = _remoteness(painter, s, m, p, p[when])
+        e = remoteness(painter, s, m, p, p[when])
         if open_ is not None and p[NEAR] < NEVER:
             start = np.stack([x, y], -1).reshape(-1, 2).astype(np.float64)
             way = np.stack([dx, dy], -1).reshape(-1, 2)
             clear = sees_reference(open_, start, start - way).reshape(painter.shape)
             e = np.where(clear, e, NEVER)
-        found.append(_Pixels(e, s, m))
+        found.append(Pixels(e, s, m))
     return found
 
 
@@ -538,14 +561,23 @@ def draw_reference(painter: Painter, table: Table, blend: float, open_: np.ndarr
     4. Within the sample's own range; zero where masked.
     """
     pixels = _on_pixels(painter, table, open_, BIAS)
+    picture, covered = blend_reference(painter, pixels, table.values, blend, painter.shape)
+    picture = np.where((covered if open_ is None else covered & open_)[..., None], picture, np.float32(0))
+    return picture if picture.shape[2] == 3 else np.repeat(picture, 3, axis=2)
+
+
+def blend_reference(painter: Painter, pixels: Sequence[Pixels], values: np.ndarray, blend: float,
+                    shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Specification of blend.h: the colours (..., channels) of pixels of `shape` on which patches with `values` (P,
+    FIELDS) lie, in order; and which are covered."""
     nearest = np.min([q.e for q in pixels], axis=0, initial=NEVER)
-    total = np.zeros(painter.shape, np.float32)
-    squares, power, colour = total.copy(), total.copy(), np.zeros((*painter.shape, painter.colour.shape[2]), np.float32)
+    total = np.zeros(shape, np.float32)
+    squares, power, colour = total.copy(), total.copy(), np.zeros((*shape, painter.colour.shape[2]), np.float32)
     mean, low, high, scale = painter.tones
-    for (e, s, m), p in zip(pixels, table.values, strict=True):
-        w = np.where(e < NEVER, _weight(e - nearest), np.float32(0))
+    for (e, s, m), p in zip(pixels, values, strict=True):
+        w = np.where(e < NEVER, weight(e - nearest), np.float32(0))
         total, squares = total + w, squares + w * w
-        beyond = _read(painter.colour, *_place(painter, s, m, p)) - mean
+        beyond = read(painter.colour, *place(painter, s, m, p)) - mean
         colour = colour + w[..., None] * beyond
         for c in range(len(mean)):
             power = power + w * (beyond[..., c] * beyond[..., c])
@@ -556,9 +588,18 @@ def draw_reference(painter: Painter, table: Table, blend: float, open_: np.ndarr
         unlike = unlike - colour[..., c] * colour[..., c]
     unlike = np.clip(unlike * scale[0] / np.maximum(one - squares / (total * total), np.float32(1e-6)), 0, 1)
     gain = one + np.float32(blend) * unlike * (total / np.sqrt(squares) - one)
-    picture = np.clip(mean + gain[..., None] * colour, low, high)
-    picture = np.where((covered if open_ is None else covered & open_)[..., None], picture, np.float32(0))
-    return picture if picture.shape[2] == 3 else np.repeat(picture, 3, axis=2)
+    return np.clip(mean + gain[..., None] * colour, low, high), covered
+
+
+def mean_reference(painter: Painter, pixels: Sequence[Pixels], values: np.ndarray,
+                   shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Specification of mean.h: the weighted mean luminance of places of `shape`, and which are covered."""
+    nearest = np.min([q.e for q in pixels], axis=0, initial=NEVER)
+    total, light = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+    for (e, s, m), p in zip(pixels, values, strict=True):
+        w = np.where(e < NEVER, weight(e - nearest), np.float32(0))
+        total, light = total + w, light + w * read(painter.luminance, *place(painter, s, m, p))[..., 0]
+    return light / np.where(total > 0, total, np.float32(1)), total > 0
 
 
 def strongest_reference(painter: Painter, table: Table, open_: np.ndarray | None) -> np.ndarray:
@@ -571,9 +612,9 @@ def strongest_reference(painter: Painter, table: Table, open_: np.ndarray | None
     nearest = np.min([q.e for q in pixels], axis=0, initial=NEVER)
     total, found = np.zeros(painter.shape, np.float32), np.zeros((2, *painter.shape, 3), np.float32)
     for (e, s, m), p in zip(pixels, table.values, strict=True):
-        w = np.where(e < NEVER, _weight(e - nearest), np.float32(0))
+        w = np.where(e < NEVER, weight(e - nearest), np.float32(0))
         total = total + w
-        x, y = _place(painter, s, m, p)
+        x, y = place(painter, s, m, p)
         this = np.stack([(x + np.float32(0.5)) / (painter.last[0] + np.float32(1)),
                          (y + np.float32(0.5)) / (painter.last[1] + np.float32(1)), w], axis=-1)
         best, second = (w > found[0, ..., 2])[..., None], (w > found[1, ..., 2])[..., None]
@@ -627,38 +668,32 @@ def rectify_reference(painter: Painter, table: Table, query: Query, rank: np.nda
     1. Each place (U, V) in the axes (s, m) of its patch: the inverse of the bend, by four steps.
     2. There the weighted mean of the patches of rank below `below`, without one of them, with weights as in `draw`.
     """
-    places, half = painter.places, np.float32(0.5)
+    places = painter.places
     out = np.zeros((len(query.who), places.padded, 2), np.float32)
     for k, (who, without, first, end) in enumerate(zip(*query, strict=True)):
         own, home = table.values[who], table.cells[who]
         U, V = places.along[first:end].T
-        a, b = U, V
-        for _ in range(4):
-            a, b = (U - own[BEND_T] * a * b - half * own[BEND_N] * b * b,
-                    V + half * own[BEND_T] * a * a + own[BEND_N] * a * b)
+        a, b = unbent(U, V, own)
         x, y = a * own[TX] - b * own[TY], a * own[TY] + b * own[TX]
         start = np.stack([own[FX] + x, own[FY] + y], -1).astype(np.float64)
         visible = np.ones(len(x), bool)
         if open_ is not None:
             visible = sees_from(open_, home, start, np.stack([x, y], -1))
-        found = []
+        found, values = [], []
         for j, ((cx, cy), p) in enumerate(zip(table.cells, table.values, strict=True)):
             if rank[j] >= below or j == without:
                 continue
             dx = x + (np.float32(home[0] - cx) + (own[FX] - p[FX]))
             dy = y + (np.float32(home[1] - cy) + (own[FY] - p[FY]))
             s, m = dx * p[TX] + dy * p[TY], dy * p[TX] - dx * p[TY]
-            e = _remoteness(painter, s, m, p, p[BIAS])
+            e = remoteness(painter, s, m, p, p[BIAS])
             if open_ is not None and p[NEAR] < NEVER:
                 e = np.where(visible & sees_from(open_, home, start, np.stack([dx, dy], -1)), e, NEVER)
-            found.append((e, _read(painter.luminance, *_place(painter, s, m, p))[..., 0]))
-        nearest = np.min([e for e, _ in found], axis=0, initial=NEVER)
-        total, light = np.zeros(len(x), np.float32), np.zeros(len(x), np.float32)
-        for e, value in found:
-            w = np.where(e < NEVER, _weight(e - nearest), np.float32(0))
-            total, light = total + w, light + w * value
-        there = (total > 0) & visible
-        out[k, first:end, 0] = np.where(there, light / np.where(there, total, np.float32(1)), np.float32(0))
+            found.append(Pixels(e, s, m))
+            values.append(p)
+        light, covered = mean_reference(painter, found, np.array(values), x.shape)
+        there = covered & visible
+        out[k, first:end, 0] = np.where(there, light, np.float32(0))
         out[k, first:end, 1] = there
     return out
 

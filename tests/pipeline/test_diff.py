@@ -117,6 +117,15 @@ def test_one_value_is_told_to_a_hundred_thousandth(step, fails):
     assert bool(compared_values("H", new, old).fault) == fails
 
 
+@pytest.mark.parametrize(("steps", "fails"), [(1, False), (-1, False), (2, True)])
+def test_a_value_of_a_picture_may_round_to_the_half_float_beside_it(steps, fails):
+    old = np.full((60, 40, 3), 0.75, np.float16)
+    new = old.copy()
+    new[7, 7, 1] += np.float16(steps * 2.0**-11)  # between 0.5 and 1 half floats are so far apart
+    found = compared_values("frames", new.astype(np.float32), old.astype(np.float32), is_light=True)
+    assert ("largest difference" in found.fault) == fails
+
+
 @pytest.mark.parametrize(("pixels", "fails"), [(0, False), (10, False), (11, True)])
 def test_a_thousandth_of_the_pixels_may_differ(pixels, fails):
     old = np.full((100, 100, 3), 0.5, np.float32)

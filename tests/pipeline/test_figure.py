@@ -90,6 +90,26 @@ def test_the_figure_is_made_again_where_what_it_shows_changes_and_not_otherwise(
         assert len(laid) == sheets, extra
 
 
+def test_an_animated_webp_is_made_beside_the_video_and_removed_with_its_key(tmp_path: Path, laid: list) -> None:
+    made = figure(tmp_path, '["coarse"]', "webp = true\n")
+    root, files = made.root, {"tiny.png", "tiny.mp4", "tiny.webp"}
+    assert len(laid) == 1 + 2 + 2
+    assert files <= {file.name for file in root.iterdir()}
+    video = (root / "tiny.mp4").stat().st_mtime_ns
+    (root / "tiny.webp").unlink()
+    laid.clear()
+    figure(tmp_path, '["coarse"]', "webp = true\n")
+    assert len(laid) == 2 and (root / "tiny.webp").is_file()
+    laid.clear()
+    figure(tmp_path, '["coarse"]')
+    assert not laid and not (root / "tiny.webp").exists() and (root / "tiny.mp4").stat().st_mtime_ns == video
+
+
+def test_a_webp_without_an_animation_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"figure.webp: there is no animation with figure.animation = false"):
+        figure(tmp_path, '["coarse"]', "webp = true\nanimation = false\n")
+
+
 def test_too_few_or_too_many_labels_are_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"figure.labels: 1 labels, but 2 panels"):
         figure(tmp_path, '["exemplar", "coarse"]', 'labels = ["one"]\n')

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 import tiny
+from scipy import ndimage
 from scipy.io import netcdf_file
 
 from pipeline import cli, flow
 from pipeline.build.graph import computed
 from pipeline.errors import BadInput
-from pipeline.files import images, meshes, pictures, volumes
+from pipeline.files import images, meshes, pictures, video, volumes
 from pipeline.flow import upsampled
 from pipeline.scene import load
 from synth import obstacle
@@ -417,7 +418,7 @@ def test_what_goes_round_the_obstacles_by_itself_declares_no_border(coarse: str)
 # -- a wind on latitude and longitude -----------------------------------------------------------------------------
 
 
-def wind(land: bool = True, speed: float = 3) -> Path:
+def wind(land: bool = True, speed: float = 3, unit: str = "") -> Path:
     """wind.nc, 40 × 30 degrees: east wind, a moment later north wind; land in its north-east quarter."""
     latitude, longitude = np.arange(-14.5, 15), np.arange(-9.5, 30)
     u, v = np.zeros((2, 2, 30, 40), np.float32)
@@ -431,6 +432,7 @@ def wind(land: bool = True, speed: float = 3) -> Path:
         for name, field in (("u", u), ("v", v)):
             one = written.createVariable(name, "f4", ("time", "lat", "lon"))
             one[:] = field[:, ::-1]
+            one.units = unit
             one._FillValue = np.float32(-999)
     return Path("wind.nc")
 
@@ -453,15 +455,39 @@ def test_a_wind_is_interpolated_in_time_and_rests_on_land() -> None:
     assert np.array_equal(solid.values < 0, np.kron(NORTH_EAST, np.ones((4, 4), bool)))
     assert solid.values[24, 0] == pytest.approx(0.5 * 64 / 48, abs=0.6 / 48)  # heights
     found = motion(scene, [1, 2, 3, 6])
-    unit = 2 / np.sqrt((9 + 36) / 2)  # rms 2 heights per second over both moments
+    shrunk = np.cos(np.radians(-13.75 + 2.5 * np.arange(12)))[:, None] * np.ones(16)
+    eastward = np.mean(9 / shrunk[~NORTH_EAST]**2)  # a degree is as long in both directions on the map
+    unit = 2 / np.sqrt((eastward + 36) / 2)  # rms 2 heights per second over both moments
     for frame, expected in ((1, (-3, 0)), (2, (-1.5, -3)), (3, (0, -6)), (6, (0, -6))):
         values = found[frame].values
         assert not values[NORTH_EAST].any()
-        assert np.allclose(values[~NORTH_EAST], np.array(expected) * unit, atol=1e-5)
+        meant = np.stack([expected[0] / shrunk, np.full(shrunk.shape, expected[1])], -1) * unit
+        assert np.allclose(values[~NORTH_EAST], meant[~NORTH_EAST], atol=1e-5)
     assert motion(scene, [2]) == {2: found[2]}
     cyclic = motion(netcdf_scene("step = 2", "step = 2\ncyclic = true"), [3, 4, 5])
-    assert np.allclose(cyclic[4].values[~NORTH_EAST], np.array((-1.5, -3)) * unit, atol=1e-5)
+    meant = np.stack([-1.5 / shrunk, np.full(shrunk.shape, -3)], -1) * unit
+    assert np.allclose(cyclic[4].values[~NORTH_EAST], meant[~NORTH_EAST], atol=1e-5)
     assert np.allclose(cyclic[5].values, found[1].values)
+
+
+@pytest.mark.parametrize(("said", "shown"), [
+    ("m s-1", "m/s"), ("m s**-1", "m/s"), ("km h-1", "km h-1"), ("knots", "knots"), ("", "the file's unit")])
+def test_speeds_of_a_wind_are_the_datas_in_its_unit(said: str, shown: str) -> None:
+    """Not those on the map, where what moves to the east is faster."""
+    wind(land=False, unit=said)
+    scene = netcdf_scene()
+    found = motion(scene, [1, 2, 3])
+    slow, between, fast = scene.coarse.speeds(found[n] for n in (1, 2, 3))
+    assert scene.coarse.unit == shown
+    assert np.allclose(slow, 3, rtol=1e-5) and np.allclose(fast, 6, rtol=1e-5)
+    assert np.allclose(between, np.hypot(1.5, 3), rtol=1e-5)
+
+
+def test_speeds_of_other_flows_are_in_heights_per_second() -> None:
+    scene = tiny.scene(Path(), tiny.TEXTURE)
+    L = motion(scene, [1])[1]
+    assert scene.coarse.unit == "heights per second"
+    np.testing.assert_allclose(next(scene.coarse.speeds([L])), np.hypot(L.values[..., 0], L.values[..., 1]), rtol=1e-6)
 
 
 def test_a_wind_without_gaps_has_no_walls_but_those_of_obstacles() -> None:
@@ -532,3 +558,103 @@ def test_a_wind_that_does_not_fit_is_refused(capsys: pytest.CaptureFixture[str],
     err = capsys.readouterr().err
     assert expected in err and err.count("\n") == 1, err
     assert sorted(Path().rglob("*")) == before
+
+
+# -- the motion in a clip ---------------------------------------------------------------------------------------------
+
+
+CLIP = tiny.changed(tiny.TEXTURE, 'kind = "analytic"\nflow = "rotation"\nsize = [16, 12]',
+                    'kind = "clip"\nfile = "clip.mp4"\nsize = [16, 12]\nsmoothing = 0.0')
+INNER = (slice(2, -2), slice(2, -2))
+"""Away from the border, where what comes in is not seen before."""
+
+
+def clip(steps: Sequence[tuple[float, float]] = ((3, -1), (3, -1), (3, -1))) -> Path:
+    """clip.mp4, 160 × 96 pixels: a cloud that moves by `steps`, pixels to the right and up."""
+    cloud = ndimage.gaussian_filter(np.random.default_rng(1).random((96, 160)), 2.5, mode="wrap")
+    cloud = (cloud - cloud.min()) / np.ptp(cloud)
+    places = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    moved = [ndimage.shift(cloud, (-up, right), order=3, mode="grid-wrap") for right, up in places]
+    video.write(Path("clip.mp4"), [np.repeat(np.clip(frame, 0, 1)[..., None], 3, axis=2) for frame in moved], 25, crf=4)
+    return Path("clip.mp4")
+
+
+def test_a_clips_motion_is_that_of_the_scene() -> None:
+    """3 of 96 pixels to the right in a frame of the clip: of a domain one height high, 3/96 in a frame of the scene."""
+    clip()
+    found = motion(tiny.scene(Path(), CLIP), [1, 2, 3])
+    for frame in (1, 2, 3):
+        assert found[frame].shape == (12, 16)
+        per_frame = found[frame].values[INNER] / 30 * 96
+        assert np.abs(per_frame.mean((0, 1)) - (3, -1)).max() < 0.05
+        assert np.abs(per_frame - (3, -1)).max() < 0.35
+    faster = motion(tiny.scene(Path(), tiny.changed(CLIP, "[texture]", "scale = 2.0\nstep = 4.0\n[texture]")), [1])[1]
+    np.testing.assert_allclose(faster.values, found[1].values / 2, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("keys", "expected"), [
+    ("smoothing = 0.0", [2, 3, 4, 4, 4]), ("smoothing = 0.0\ncyclic = true", [2, 3, 4, 2, 3]),
+    ("smoothing = 0.0\nstep = 2.0", [1, 1.25, 1.5, 1.75, 2]),
+    ("smoothing = 50.0\ncyclic = true", [3, 3, 3, 3, 3])])
+def test_after_the_clips_end_its_motion_stays_or_comes_again(keys: str, expected: list[float]) -> None:
+    clip([(2, 0), (3, 0), (4, 0)])
+    text = tiny.changed(tiny.changed(CLIP, "frames = 3", "frames = 5"), "smoothing = 0.0", keys)
+    found = motion(tiny.scene(Path(), text), [1, 2, 3, 4, 5])
+    means = [found[frame].values[INNER].mean((0, 1))[0] / 30 * 96 for frame in range(1, 6)]
+    assert np.allclose(means, expected, atol=0.06)
+
+
+def test_a_texture_follows_a_clip_past_a_stone() -> None:
+    clip()
+    graph = tiny.made(Path(), CLIP)
+    first, last = (graph.read("", "frames", frame) for frame in (1, 3))
+    assert np.abs(last - first).mean() > 0.001
+    graph = tiny.made(Path(), tiny.changed(CLIP, "[texture]", f"{BALL}\n[texture]"))
+    solid, found = graph.read("", "solid", 0), graph.read("", "L", 1)
+    assert np.sqrt(np.mean(divergence(found.per_frame(30).values, "open", solid.values * 48) ** 2)) < 1e-3
+
+
+def test_elements_and_details_follow_a_clip() -> None:
+    clip()
+    for text, made in ((tiny.BEADS, "[16, 16]"), (tiny.SMOKE, "[8, 8]")):
+        scene = tiny.scene(Path(), tiny.changed(text, f'kind = "analytic"\nflow = "rotation"\nsize = {made}',
+                                                f'kind = "clip"\nfile = "clip.mp4"\nsize = {made}'))
+        # square: the middle 96 of 160 columns
+        assert np.abs(motion(scene, [1])[1].values[INNER].mean((0, 1)) * 96 / scene.fps - (3, -1)).max() < 0.1
+
+
+@pytest.mark.parametrize(("given", "told"), [
+    ("nothing moves", "clip.mp4: coarse.file: nothing moves in the clip"),
+    ("one frame", "clip.mp4: coarse.file: 1 frames; motion needs two"),
+    ("small", "clip.mp4: coarse.file: frame 1 of the clip of 6 x 6 is too small; at least 8 a side"),
+    ("no clip", "clip.mp4: coarse.file: damaged")])
+def test_a_clip_that_shows_no_motion_is_one_line_and_nothing_is_written(
+        capsys: pytest.CaptureFixture[str], given: str, told: str) -> None:
+    count, edge = (1 if given == "one frame" else 3), (6 if given == "small" else 32)
+    video.write(Path("clip.mp4"), np.full((count, edge, edge, 3), 0.5), 25)
+    if given == "no clip":
+        Path("clip.mp4").write_text("none")
+    Path("tiny.toml").write_text(CLIP)
+    assert cli.run(["figure", "tiny.toml"]) == 2
+    line = capsys.readouterr().err
+    assert told in line and line.count("\n") == 1 and not Path("out").exists()
+
+
+def test_a_clip_is_of_the_plane() -> None:
+    clip()
+    text = tiny.changed(tiny.SPACE, 'kind = "analytic"\nflow = "constant"', 'kind = "clip"\nfile = "clip.mp4"')
+    assert tiny.complaint(tiny.written(Path(), text)) == (
+        'coarse.kind: "clip" is a flow of the plane; detail.size is 16×8×16')
+
+
+@pytest.mark.parametrize("coarse", ['kind = "clip"\nfile = "a.mp4"\nsize = [16, 12]', 'kind = "file"\nfile = "a.exr"',
+                                    'kind = "netcdf"\nfile = "a.nc"\nsize = [16, 12]'])
+def test_a_file_of_a_motion_past_an_obstacle_is_read_before_anything_is_written(
+        capsys: pytest.CaptureFixture[str], coarse: str) -> None:
+    for name in ("a.mp4", "a.exr", "a.nc"):
+        Path(name).write_text("no such thing")
+    text = tiny.changed(tiny.TEXTURE, 'kind = "analytic"\nflow = "rotation"\nsize = [16, 12]', coarse)
+    Path("tiny.toml").write_text(tiny.changed(text, "[texture]", f"{BALL}\n[texture]"))
+    assert cli.run(["figure", "tiny.toml"]) == 2
+    line = capsys.readouterr().err
+    assert "coarse.file: " in line and line.count("\n") == 1 and not Path("out").exists()

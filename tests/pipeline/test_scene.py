@@ -214,6 +214,7 @@ ONE_FIGURE = GOOD + '[variants."first"]\n[variants."other"]\n'
 @pytest.mark.parametrize(("line", "expected"), [
     ('"figure.frame" = 2', '"figure.frame": is 2, and 0 in'),
     ('"figure.animation" = false', '"figure.animation": is false, and true in'),
+    ('"figure.webp" = true', '"figure.webp": is true, and false in'),
     ('"figure.columns" = 3', '"figure.columns": is 3, and 0 in'),
     ('"fps" = 12.5', '"fps": is 12.5, and 30 in'),
     ("figure = { frame = 2 }", '"figure.frame": is 2, and 0 in'),

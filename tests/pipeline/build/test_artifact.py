@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.build.artifact import Artifact
 from pipeline.files.images import FIELD
+from pipeline.tables import FigureTable
 
 
 def make(scene: Any, inputs: Any, frames: list[int]) -> Iterator[tuple[int, Any]]:
@@ -19,7 +20,7 @@ def artifact(stage: str = "bake", **how: Any) -> Artifact:
 
 
 def scene(frames: int = 3, frame: int = 0, animation: bool = True) -> Any:
-    return SimpleNamespace(frames=frames, figure=SimpleNamespace(frame=frame, animation=animation))
+    return SimpleNamespace(frames=frames, figure=FigureTable(frame=frame, animation=animation))
 
 
 def test_a_series_is_numbered_from_1_and_a_single_file_is_not() -> None:

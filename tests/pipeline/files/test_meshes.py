@@ -84,3 +84,88 @@ def test_points_come_back_with_what_they_carry(tmp_path: Path) -> None:
         meshes.write_points(tmp_path / "c.ply", VERTICES[:3], {"age": np.zeros(2, np.int32)})
     with pytest.raises(ValueError, match="finite"):
         meshes.write_points(tmp_path / "c.ply", VERTICES[:3] * np.nan, {})
+
+
+# surfaces
+
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+BOTH = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS)
+
+
+def test_a_surface_comes_back_with_its_attributes_and_programs_find_its_uv(tmp_path: Path) -> None:
+    one = {"vertices": CORNERS, "faces": BOTH, "s": CORNERS[:, 0], "t": CORNERS[:, 1],
+           "part": np.arange(4, dtype=np.int32)}
+    meshes.SURFACE.write(tmp_path / "a.ply", one)
+    back = meshes.SURFACE.read(tmp_path / "a.ply")
+    assert back.keys() == one.keys()
+    for name, values in one.items():
+        np.testing.assert_array_equal(back[name], values)
+        assert back[name].dtype == values.dtype
+    head = (tmp_path / "a.ply").read_bytes()[:400]
+    assert b"property float s" in head and b"property float t" in head
+    (tmp_path / "b.ply").write_bytes((tmp_path / "a.ply").read_bytes()[:-4])
+    with pytest.raises(BadInput, match=r"b\.ply: damaged"):
+        meshes.SURFACE.read(tmp_path / "b.ply")
+    with pytest.raises(ValueError, match="part of vertices are finite and as many as these, 4"):
+        meshes.SURFACE.write(tmp_path / "c.ply", {**one, "part": np.zeros(3)})
+    # and it is a user's mesh, with a vector at each vertex
+    vertices, faces, vectors = meshes.read_surface(tmp_path / "a.ply", "key", ["s", "t", "part"], "names")
+    order = np.lexsort(CORNERS.T[::-1])
+    np.testing.assert_array_equal(vertices, CORNERS[order])
+    np.testing.assert_array_equal(vectors, np.column_stack([CORNERS[:, :2], np.arange(4)])[order])
+    assert len(faces) == 2
+
+
+@pytest.mark.parametrize("text", [
+    OBJ + "f 1 2 3 4\n", OBJ + "vt 0 0\nvt 1 1\nf 1/1 2/2 3/1\nf 1/1 3/2 4/1\n",
+    OBJ + "o one\nf 1 2 3\no two\nf 1 3 4\n"], ids=["a quad", "places in a texture", "two objects"])
+def test_obj_files_are_surfaces_and_solids(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.obj").write_text(text)
+    vertices, faces, vectors = meshes.read_surface(tmp_path / "a.obj", "key", [], "names")
+    assert vertices.shape == (4, 3) and not vectors.any()
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    np.testing.assert_allclose(np.cross(b - a, c - a), np.broadcast_to([0, 0, 1], (2, 3)))
+    with pytest.raises(BadInput, match="encloses nothing"):  # it is read, and is no solid
+        meshes.read_solid(tmp_path / "a.obj", "key", 0.1)
+
+
+def test_vectors_that_a_file_cannot_have_are_told_with_their_key(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text(OBJ + "f 1 2 3\n")
+    with pytest.raises(BadInput, match=r"a\.obj: names: its vertices have no vx, vy, vz$"):
+        meshes.read_surface(tmp_path / "a.obj", "key", ["vx", "vy", "vz"], "names")
+
+
+USDA = """#usda 1.0
+( upAxis = "Z" )
+def Xform "turned" {
+    double3 xformOp:translate = (10, 0, 0)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+    def Mesh "one" {
+        int[] faceVertexCounts = [4]
+        int[] faceVertexIndices = [0, 1, 2, 3]
+        point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+        vector3f[] primvars:flow = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)] ( interpolation = "vertex" )
+    }
+}
+"""
+
+
+def test_usd_files_are_surfaces_with_a_primvar_as_field_y_up(tmp_path: Path) -> None:
+    (tmp_path / "a.usda").write_text(USDA)
+    vertices, faces, vectors = meshes.read_surface(tmp_path / "a.usda", "key", ["flow"], "names")
+    expected = {(10, 0, 0): (1, 0, 0), (11, 0, 0): (0, 0, -1), (11, 0, -1): (0, 1, 0), (10, 0, -1): (1, 1, -1)}
+    assert {tuple(v): tuple(f) for v, f in zip(vertices.tolist(), vectors.tolist(), strict=True)} == expected
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    np.testing.assert_allclose(np.cross(b - a, c - a), np.broadcast_to([0, 1, 0], (2, 3)))
+
+
+@pytest.mark.parametrize(("old", "new", "reason"), [
+    (", (1, 1, 1)]", "]", r"key: /turned/one has 4 vertices, and flow is of shape \(3, 3\)"),
+    ("primvars:flow", "primvars:other", "names: its meshes have no primvar flow"),
+    ("[0, 1, 2, 3]", "[0, 1, 2, 7]", "key: /turned/one names a vertex that does not exist"),
+])
+def test_what_a_usd_file_lacks_is_told(tmp_path: Path, old: str, new: str, reason: str) -> None:
+    (tmp_path / "a.usda").write_text(USDA.replace(old, new))
+    with pytest.raises(BadInput, match=rf"a\.usda: {reason}"):
+        meshes.read_surface(tmp_path / "a.usda", "key", ["flow"], "names")

@@ -25,8 +25,9 @@ def wind(longitude: np.ndarray = LONGITUDE, latitude: np.ndarray = LATITUDE, tim
 def written(fields: dict[str, np.ndarray] | None = None, *, version: int = 3, latitude: np.ndarray = LATITUDE,
             longitude: np.ndarray = LONGITUDE, names: tuple[str, ...] = ("time", "lat", "lon"),
             units: tuple[str, ...] = ("days since 2000-01-01", "degrees_north", "degrees_east"),
-            **attributes: Any) -> Path:
-    """a.nc with fields (time, latitude, longitude); `attributes` are those of each of them."""
+            unit: str = "", **attributes: Any) -> Path:
+    """a.nc with fields (time, latitude, longitude); `unit` and `attributes` are those of each of them."""
+    attributes |= {"units": unit} if unit else {}
     fields = wind(longitude, latitude) if fields is None else fields
     times = len(next(iter(fields.values())))
     axes = dict(zip(names, zip((np.arange(times, dtype=float), latitude, longitude), units, strict=True), strict=True))
@@ -177,10 +178,13 @@ def test_a_field_linear_in_place_is_itself_on_the_cells() -> None:
     found = netcdf.read_foreign(written(), "coarse", window=(105, -20, 145, 20))
     values, share = found.on((8, 8))
     assert values.shape == (3, 8, 8, 2) and (share == 1).all()
-    assert np.allclose(values[1, :, 3, 0], -17.5 + 5 * np.arange(8) + 1)
+    latitude = -17.5 + 5 * np.arange(8)
+    assert np.allclose(values[1, :, 3, 0] * np.cos(np.radians(latitude)), latitude + 1)
     assert np.allclose(values[2, 5, :, 1], 107.5 + 5 * np.arange(8))
     wide = found.on((4, 16))[0]  # the middle of the window, 10 degrees high, a degree as long in both directions
-    assert np.allclose(wide[0, :, 0, 0], -3.75 + 2.5 * np.arange(4))
+    latitude = -3.75 + 2.5 * np.arange(4)
+    assert np.allclose(wide[0, :, 0, 0] * np.cos(np.radians(latitude)), latitude)
+    assert np.array_equal(found.places((4, 16))[0], latitude)
     assert np.allclose(wide[0, 0, :, 1], 106.25 + 2.5 * np.arange(16))
 
 
@@ -188,7 +192,9 @@ def test_what_is_missing_does_not_dilute_what_is_there() -> None:
     fields = wind()
     fields["u"][:], fields["v"][:] = 3, 4
     fields["u"][:, :, :3] = np.nan
-    values, share = netcdf.read_foreign(written(fields), "coarse").on((20, 24))
+    found = netcdf.read_foreign(written(fields), "coarse")
+    values, share = found.on((20, 24))
+    values[..., 0] *= netcdf.shrunk(found.places((20, 24))[0])[:, None]
     there = share >= 0.5
     assert np.allclose(values[:, there], (3, 4)) and not values[:, ~there].any()
     assert np.array_equal(there, np.broadcast_to(np.arange(24) >= 12, (20, 24)))  # half-way, at 125 degrees
@@ -201,7 +207,47 @@ def test_larger_cells_are_means() -> None:
     fields = wind(np.arange(0.0, 40), np.arange(0.0, 40))
     fields["u"][:] = np.where(np.arange(40) % 2, 1, -1) + 2.0  # a wind that changes from column to column
     found = netcdf.read_foreign(written(fields, latitude=np.arange(0.0, 40), longitude=np.arange(0.0, 40)), "coarse")
-    assert np.abs(found.on((5, 5))[0][..., 1:-1, 0] - 2).max() < 0.2
+    east = found.on((5, 5))[0][..., 0] * netcdf.shrunk(found.places((5, 5))[0])[:, None]
+    assert np.abs(east[..., 1:-1] - 2).max() < 0.2
+
+
+def test_what_moves_on_the_map_moves_so_on_the_globe() -> None:
+    """A place that moves for a second, at 4 and 3 degrees of a great circle a second, to the east and to the north."""
+    latitude, longitude = np.arange(-80.0, 81, 2), np.arange(0.0, 161, 2)
+    still = np.ones((1, len(latitude), len(longitude)), np.float32)
+    written({"u": 4 * still, "v": 3 * still}, latitude=latitude, longitude=longitude)
+    found = netcdf.read_foreign(Path("a.nc"), "coarse")
+    values, (y, x) = found.on((162, 162))[0][0], found.places((162, 162))
+    for row in (10, 40, 81, 125, 150):
+        start = np.radians([y[row], x[7]])
+        time = 1e-3
+        moved = start + np.radians(values[row, 7, ::-1]) * time
+        east, north = np.array([-np.sin(start[1]), np.cos(start[1]), 0]), np.array([
+            -np.sin(start[0]) * np.cos(start[1]), -np.sin(start[0]) * np.sin(start[1]), np.cos(start[0])])
+        on_globe = on_sphere(start) + np.radians(4 * east + 3 * north) * time
+        assert np.linalg.norm(on_sphere(moved) - on_globe) < 1e-3 * np.radians(5) * time
+
+
+def on_sphere(radians: np.ndarray) -> np.ndarray:
+    """The point of the unit sphere at a latitude and a longitude."""
+    (c, d), (s, t) = np.cos(radians), np.sin(radians)
+    return np.array([c * d, c * t, s])
+
+
+def test_at_a_pole_the_wind_on_the_map_stays_finite() -> None:
+    latitude = np.arange(60.0, 91, 2)
+    one = np.ones((1, len(latitude), 6), np.float32)
+    found = netcdf.read_foreign(written({"u": one, "v": one}, latitude=latitude), "coarse")
+    values, (y, _) = found.on((310, 100))[0][0], found.places((310, 100))
+    assert y[-1] > 89.9 and np.allclose(values[..., 1], 1, atol=1e-6)
+    assert np.allclose(values[y >= 85, :, 0], 1 / np.cos(np.radians(85)), rtol=1e-6)
+    assert (np.diff(values[y < 85, 0, 0]) > 0).all()
+
+
+@pytest.mark.parametrize("version", [3, 4])
+def test_the_unit_is_the_files(version: int) -> None:
+    assert netcdf.read_foreign(written(version=version), "coarse").unit == ""
+    assert netcdf.read_foreign(written(version=version, unit="m s**-1"), "coarse").unit == "m s**-1"
 
 
 def test_what_does_not_fit_is_said_in_a_line() -> None:

@@ -68,6 +68,25 @@ def test_every_kind_of_png_is_understood(tmp_path: Path, pixels: np.ndarray, col
     assert np.allclose(picture[0, 0], expected, atol=1e-6)
 
 
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_colours_of_any_depth_come_as_stored_beside_their_alpha(tmp_path: Path, kind: type, channels: int) -> None:
+    most = np.iinfo(kind).max
+    pixels = (drawn(5, 7, channels) * most).astype(kind)
+    pixels[0, 0] = most
+    pixels[1, 1, -1] = 0
+    read = pictures.read_coloured(png(tmp_path / "a.png", pixels, {1: 0, 2: 4, 3: 2, 4: 6}[channels]), "sample.file")
+    assert not read.is_linear and read.colour.shape == (5, 7, 3) and read.colour.dtype == np.float32
+    colours = pixels[..., :-1] if channels in (2, 4) else pixels
+    np.testing.assert_array_equal(np.rint(read.colour.astype(np.float64) * most),
+                                  np.broadcast_to(colours, (5, 7, 3)))
+    if channels in (2, 4):
+        assert read.alpha is not None
+        np.testing.assert_array_equal(np.rint(read.alpha.astype(np.float64) * most), pixels[..., -1])
+    else:
+        assert read.alpha is None
+
+
 def test_grey_values_have_the_lowest_row_first(tmp_path: Path) -> None:
     pixels = np.zeros((3, 2), np.uint8)
     pixels[0, 1] = 255  # top right

@@ -1,9 +1,11 @@
 """Videos hold every frame, in its colours, and the same bytes for the same frames."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import av
+import cv2
 import numpy as np
 import pytest
 
@@ -47,6 +49,72 @@ def test_the_same_frames_are_the_same_bytes(tmp_path: Path) -> None:
         contents.add((tmp_path / "a.mp4").read_bytes())
         kept.append(np.full(50_000 * (n + 1), n, np.uint8))  # another state of the memory
     assert len(contents) == 1
+
+
+@pytest.mark.parametrize("fps", [30.0, 24.0, 12.5, 1000.0, 0.5])
+def test_a_webp_repeats_the_pictures_without_end_each_in_its_time(tmp_path: Path, fps: float) -> None:
+    """Of an odd width. Decoded by OpenCV, which takes it as a viewer does."""
+    assert video.write_webp(tmp_path / "a.webp", frames(7), fps) == 7
+    read, shown = cv2.imreadanimation(str(tmp_path / "a.webp"))
+    assert read and shown.loop_count == 0 and len(shown.frames) == 7
+    ends = np.cumsum(shown.durations)
+    np.testing.assert_allclose(ends[:-1], np.arange(1, 7) * 1000 / fps, atol=0.51)
+    assert abs(ends[-1] - 7000 / fps) < 1.6  # libwebp takes the mean of the others for the last
+    for seen, meant in zip(shown.frames, frames(7), strict=True):
+        seen = seen[..., 2::-1] / 255
+        assert seen.shape == meant.shape == (66, 97, 3)
+        # away from the edges, where colours are stored at half the size
+        assert np.abs(seen[5, 4] - meant[5, 4]).max() < 0.03
+        assert np.abs(seen[60, 60] - meant[60, 60]).max() < 0.03
+        assert np.abs(seen - meant).mean() < 0.01
+
+
+def test_a_picture_that_stays_stands_longer_and_one_that_never_changes_is_a_still(tmp_path: Path) -> None:
+    first, second, _ = frames(3)
+    video.write_webp(tmp_path / "a.webp", [first, first, first, second], 10.0)
+    shown = cv2.imreadanimation(str(tmp_path / "a.webp"))[1]
+    assert list(shown.durations) == [300, 100]
+    assert video.write_webp(tmp_path / "a.webp", [first] * 3, 10.0) == 3
+    assert np.abs(cv2.imread(str(tmp_path / "a.webp"))[..., ::-1] / 255 - first).mean() < 0.01
+
+
+def test_the_same_frames_are_the_same_bytes_of_webp(tmp_path: Path) -> None:
+    kept, contents = [], set()
+    for n in range(4):
+        video.write_webp(tmp_path / "a.webp", frames(), 24.0)
+        contents.add((tmp_path / "a.webp").read_bytes())
+        kept.append(np.full(50_000 * (n + 1), n, np.uint8))  # another state of the memory
+    assert len(contents) == 1
+
+
+@pytest.mark.parametrize("damage", [lambda b: b[:-2], lambda b: b[:len(b) // 2], lambda b: b + b"\0\0",
+                                    lambda b: b"", lambda b: b.replace(b"ANMF", b"XXXX", 1)])
+def test_a_webp_that_does_not_read_back_whole_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                             damage: Callable[[bytes], bytes]) -> None:
+    encode = video._encode_webp
+
+    def damaged(path: Path, *given: Any) -> int:
+        count = encode(path, *given)
+        path.write_bytes(damage(path.read_bytes()))
+        return count
+
+    monkeypatch.setattr(video, "_encode_webp", damaged)
+    with pytest.raises(StorageFailed, match="does not hold its 5 frames"):
+        video.write_webp(tmp_path / "a.webp", frames(), 30.0)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_too_wide_for_webp_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(StorageFailed, match="WebP: ") as caught:
+        video.write_webp(tmp_path / "a.webp", [np.zeros((2, 16400, 3), np.uint8)], 30.0)
+    assert "\n" not in str(caught.value) and list(tmp_path.iterdir()) == []
+
+
+def test_what_is_no_animation_is_refused(tmp_path: Path) -> None:
+    for given, reason in (([], "at least one frame"), ([np.zeros((4, 4, 3)), np.zeros((4, 6, 3))], "frame 2 has")):
+        with pytest.raises(ValueError, match=reason):
+            video.write_webp(tmp_path / "a.webp", given, 30.0)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_clip_is_read_grey_with_the_lowest_row_first(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from tiny import BY_PAPER, TEXTURE, scene
+from tiny import BY_PAPER, TEXTURE, TEXTURE_ON_SURFACE, scene
 
 from pipeline.scene import load
 from pipeline.tables import PROJECT_SCENES
@@ -12,7 +12,7 @@ from pipeline.texture.method import METHOD
 STONE = TEXTURE + '[[obstacles]]\nkind = "ball"\ncentre = [0.0, 0.5]\nradius = 0.2\n'
 
 
-@pytest.mark.parametrize("text", [TEXTURE, BY_PAPER, STONE])
+@pytest.mark.parametrize("text", [TEXTURE, BY_PAPER, STONE, TEXTURE_ON_SURFACE])
 def test_artifacts_come_after_their_inputs(tmp_path: Path, text: str) -> None:
     one, known = scene(tmp_path, text), set[str]()
     for artifact in METHOD.artifacts(one):
