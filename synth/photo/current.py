@@ -1,0 +1,76 @@
+"""A current past stones that repeats after T frames: a steady flow and eddies that it carries.
+
+Both are the curl of a potential, so nothing diverges [Bridson et al. 2007]. The steady one passes round each stone. The
+eddies are a tile of noise that drifts with the flow and changes on its way; it drifts by whole tiles in T frames.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from synth import opencl
+from synth.noise import curl
+from synth.photo.carried import sampled
+from synth.photo.tiles import noise
+from synth.wake import ramp
+
+
+@dataclass(frozen=True, eq=False)
+class Current:
+    """steady (Y, X, 2) float32, pixels per frame; eddies: potentials of each frame, (T, Y + 2, X + 2) float32."""
+
+    steady: np.ndarray
+    eddies: np.ndarray
+
+    def velocity(self, frame: int) -> np.ndarray:
+        """The velocity in a frame, (Y, X, 2) float32."""
+        return (self.steady + curl(self.eddies[frame][None])).astype(np.float32)
+
+    def mean(self) -> np.ndarray:
+        """The mean of all frames, (Y, X, 2) float32."""
+        return (self.steady + curl(self.eddies.mean(0)[None])).astype(np.float32)
+
+
+def past_stones(U: np.ndarray, distance: np.ndarray, influence: float) -> np.ndarray:
+    """A uniform flow U (2: x, y) past what lies where distance (Y, X) is negative: (Y, X, 2) float32.
+
+    influence  pixels from a wall within which the flow is turned. The speed falls to zero at the wall only as far as
+    the wall is not a circle: each stone is taken to have the mean potential of the flow over itself.
+    """
+    padded = np.pad(distance, 1, mode="edge")
+    y, x = np.mgrid[: padded.shape[0], : padded.shape[1]].astype(np.float64)
+    free = U[0] * y - U[1] * x
+    numbers, count = ndimage.label(padded < 0)
+    if not count:
+        return curl(free[None]).astype(np.float32)
+    away, nearest = ndimage.distance_transform_edt(numbers == 0, return_indices=True)
+    levels = np.concatenate([[0], ndimage.mean(free, numbers, np.arange(1, count + 1))])
+    level = levels[numbers[tuple(nearest)]]
+    psi = level + (free - level) * ramp(away / influence)
+    return curl(ndimage.gaussian_filter(psi, 1.5)[None]).astype(np.float32)
+
+
+def eddies(shape: tuple[int, int], frames: int, U: np.ndarray, size: float, speed: float, strength: np.ndarray,
+           random: np.random.Generator) -> np.ndarray:
+    """Potentials (T, Y + 2, X + 2) float32 of eddies `size` pixels wide of rms speed `speed` times strength (Y, X)."""
+    travelled = np.abs(U) * frames
+    # a tile of about 256 pixels along each axis, passed a whole number of times
+    turns = np.maximum(np.rint(travelled / 256), (travelled > 64) * 1.0)
+    pixels = np.where(turns > 0, travelled / np.maximum(turns, 1), 256)
+    A = np.diag(256 / pixels)
+    two = np.stack([noise((256, 256), random, size, falloff=2.0) for _ in range(2)])
+    phases = np.zeros((frames, 2, 3), np.float32)
+    turn = 2 * np.pi * np.arange(frames) / frames * max(1, round(frames / 48))
+    drift = -np.arange(frames)[:, None] * np.sign(U) * turns * 256 / frames
+    phases[:, 0, :2] = phases[:, 1, :2] = drift
+    phases[:, 0, 2], phases[:, 1, 2] = np.cos(turn), np.sin(turn)
+    padded = (shape[0] + 2, shape[1] + 2)
+    psi = np.zeros((frames, *padded), np.float32)
+    for k in range(2):
+        psi += sampled(opencl.to_device(two[k][None]), opencl.zeros((*padded, 2)), phases[:, k : k + 1],
+                       np.zeros(frames, np.int32), A)
+    scale = np.sqrt(np.mean(np.square(curl(psi[0][None])).sum(-1)))
+    return psi * np.float32(speed / scale) * np.pad(strength, 1, mode="edge").astype(np.float32)
