@@ -15,7 +15,10 @@ from synth import opencl
 from synth.noise import curl
 from synth.photo.carried import sampled
 from synth.photo.tiles import noise
-from synth.wake import ramp
+from synth.projection import project
+
+
+SMOOTH = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,23 +37,22 @@ class Current:
         return (self.steady + curl(self.eddies.mean(0)[None])).astype(np.float32)
 
 
-def past_stones(U: np.ndarray, distance: np.ndarray, influence: float) -> np.ndarray:
+def past_stones(U: np.ndarray, distance: np.ndarray) -> np.ndarray:
     """A uniform flow U (2: x, y) past what lies where distance (Y, X) is negative: (Y, X, 2) float32.
 
-    influence  pixels from a wall within which the flow is turned. The speed falls to zero at the wall only as far as
-    the wall is not a circle: each stone is taken to have the mean potential of the flow over itself.
+    The flow without eddies that does not pass through walls, found on every fourth pixel and smoothed over SMOOTH
+    shares of the picture's height: what lies on the water is turned aside early, as the layer at a wall slows it.
     """
-    padded = np.pad(distance, 1, mode="edge")
-    y, x = np.mgrid[: padded.shape[0], : padded.shape[1]].astype(np.float64)
-    free = U[0] * y - U[1] * x
-    numbers, count = ndimage.label(padded < 0)
-    if not count:
-        return curl(free[None]).astype(np.float32)
-    away, nearest = ndimage.distance_transform_edt(numbers == 0, return_indices=True)
-    levels = np.concatenate([[0], ndimage.mean(free, numbers, np.arange(1, count + 1))])
-    level = levels[numbers[tuple(nearest)]]
-    psi = level + (free - level) * ramp(away / influence)
-    return curl(ndimage.gaussian_filter(psi, 1.5)[None]).astype(np.float32)
+    coarse = np.ascontiguousarray(distance[::4, ::4] / 4, np.float32)
+    uniform = np.broadcast_to(np.asarray(U, np.float32), (*coarse.shape, 2))
+    if not (coarse < 0).any():
+        return np.array(np.broadcast_to(np.asarray(U, np.float32), (*distance.shape, 2)))
+    margin = 12  # the border lets nothing be turned: keep it away
+    v = project(np.pad(uniform, ((margin, margin), (margin, margin), (0, 0)), mode="edge"), "open",
+                np.pad(coarse, margin, mode="edge"))[margin:-margin, margin:-margin]
+    v = ndimage.gaussian_filter(v, (SMOOTH * len(v), SMOOTH * len(v), 0), mode="nearest")
+    fine = ndimage.zoom(v, (4, 4, 1), order=1, grid_mode=True, mode="nearest")
+    return np.ascontiguousarray(fine[: distance.shape[0], : distance.shape[1]], np.float32)
 
 
 def eddies(shape: tuple[int, int], frames: int, U: np.ndarray, size: float, speed: float, strength: np.ndarray,

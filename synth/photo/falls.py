@@ -281,7 +281,7 @@ def _ground(ground: Bed, envelope: np.ndarray, random: np.random.Generator, shap
     scale = shape[0] / 240
     y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
     shore = ground.foot + 2.5 * scale * noise((4, shape[1]), random, (30 * scale, 4), falloff=0.6, finest=1)[0]
-    deep = np.clip(shore - y, 0, None) / scale
+    deep = np.clip(ground.foot - y, -4, None) / scale
     near = 1 + 0.02 * deep  # nearer to the viewer, foam looks larger
     tile = lace(256, random, 22 * scale)
     places = np.stack([0.5 * shape[1] + (x - 0.5 * shape[1]) / near - x, -FLAT * scale * np.log(near) / 0.02 - y], -1)

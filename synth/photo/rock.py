@@ -71,7 +71,7 @@ def stones(shape: tuple[int, int], random: np.random.Generator, centres: np.ndar
 def pebbles(shape: tuple[int, int], random: np.random.Generator, size: float) -> np.ndarray:
     """A bed of pebbles about `size` pixels wide, each of its own grey."""
     total = np.full(shape, 0.12, np.float32)
-    for scale in (0.45, 1.0):
+    for scale in (0.4, 1.0):
         count = max(4, round(shape[0] * shape[1] / (scale * size) ** 2))
         box = np.array(shape[::-1], float)
         points = random.random((count, 2)) * box
@@ -88,5 +88,5 @@ def pebbles(shape: tuple[int, int], random: np.random.Generator, size: float) ->
         grey = greys[nearest[:, 0]].reshape(shape) * (0.45 + 0.85 * lit(ndimage.gaussian_filter(dome, 0.7)))
         chosen = body if scale < 1 else body * (random.random(count)[nearest[:, 0]].reshape(shape) < 0.6)
         total = total * (1 - chosen) + chosen * grey
-    grain = 1 + 0.07 * noise(shape, random, 4, falloff=0.3, finest=1.2)
+    grain = 1 + 0.04 * noise(shape, random, 4, falloff=0.3, finest=1.2)
     return np.clip(total * grain, 0.03, 0.95).astype(np.float32)

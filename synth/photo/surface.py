@@ -19,10 +19,17 @@ from synth.photo.sea import sea
 from synth.photo.tiles import lace, noise, rng, smooth_step
 
 TILE = 192
+UPPER_LEFT = 2.2  # where light comes from, radians
+
+
+def lit_along(direction: float) -> float:
+    """The direction of a light that shows waves which travel along `direction`: upward on the picture, radians."""
+    nearly = direction + 0.4
+    return nearly if np.sin(nearly) >= 0 else nearly + np.pi
 
 
 def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, speed: float, stones: int,
-            white: float, relief: float, ripples: float = 0.16, eddying: float = 0.25, tone: float = 0.14) -> Clip:
+            white: float, relief: float, ripples: float = 0.16, eddying: float = 0.14, tone: float = 0.14) -> Clip:
     """Running water.
 
     direction  of the current, radians counter-clockwise from x
@@ -45,15 +52,15 @@ def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, 
     density = _foam(current, breaking, frames, rng(seed, 14), scale)
 
     foam_tile = lace(256, rng(seed, 15), 20 * scale)
-    boil = noise((256, 256), rng(seed, 16), 12 * scale, falloff=0.45, finest=1.5)
-    waves = sea(TILE, frames, rng(seed, 17), length=22 * scale, wind=direction + 0.6, gravity=0.12 * scale,
+    boil = noise((256, 256), rng(seed, 16), 15 * scale, falloff=1.0, finest=1.5)
+    waves = sea(TILE, frames, rng(seed, 17), length=36 * scale, wind=direction + 0.6, gravity=0.12 * scale,
                 slope=ripples, spread=1.0, shortest=3.0)
     slopes = np.stack([waves.slopes(t) for t in range(frames)], 1)
     tiles = [opencl.to_device(tile) for tile in (foam_tile[None], _lit(boil)[None], *slopes)]
     # along the current foam is drawn out
     c, s = np.cos(direction), np.sin(direction)
     turn = np.array([[c, s], [-s, c]])
-    A = np.diag([0.6, 1.15]) @ turn
+    A = np.diag([0.75, 1.1]) @ turn
     relief_y, relief_x = (relief * part for part in np.gradient(bed / _steepness(bed)))
     splashes = drops.streaks(_thrown(breaking, U, rng(seed, 18), frames, white, scale), frames, shape, 0.6)
     dry = smooth_step(0.0, -1.5, standing.distance)
@@ -62,13 +69,13 @@ def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, 
     for state in carried(current.velocity, frames, _period(frames)):
         t = state.frame
         walls = state.picture(tiles[0], seed + 1, A)
-        lumps = state.picture(tiles[1], seed + 2, A)
+        lumps = state.picture(tiles[1], seed + 2)
         moving = [state.picture(tile, seed + 3, part=t) for tile in tiles[2:]]
-        water = reflected(relief_x + moving[0], relief_y + moving[1], tone)
+        water = reflected(relief_x + moving[0], relief_y + moving[1], tone, lit_along(direction))
         water *= 1 - 0.35 * rim
         dense = density[t]
-        foam = smooth_step(0.1, 1.7, 0.62 * walls + 0.35 * lumps + 3.4 * dense - 0.75)
-        shade = 0.74 + 0.13 * lumps + 0.06 * walls + 0.5 * np.clip(relief_x * -0.45 + relief_y * 0.6, -0.4, 0.4)
+        foam = smooth_step(0.1, 1.6, (0.8 - 0.5 * dense) * walls + 0.3 * lumps + 2.8 * dense - 0.8)
+        shade = 0.76 + 0.10 * lumps + 0.05 * walls + 0.5 * np.clip(relief_x * -0.45 + relief_y * 0.6, -0.4, 0.4)
         grey = water + foam * (np.clip(shade, 0.4, 0.97) - water)
         grey += (standing.grey - grey) * dry
         grey += (0.95 - grey) * (1 - np.exp(-ndimage.gaussian_filter(splashes[t], 0.5)))
@@ -81,29 +88,29 @@ def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, 
 def white_water(seed: int, frames: int, size: tuple[int, int], *, direction: float = -0.4, speed: float = 3.5,
                 stones: int = 1, white: float = 0.6) -> Clip:
     """Rapids: standing waves that break; parameters as `running`."""
-    return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, relief=0.30,
-                   ripples=0.2, eddying=0.35)
+    return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, relief=0.2,
+                   ripples=0.2, eddying=0.16)
 
 
 def river(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0.2, speed: float = 2.2,
           stones: int = 4, white: float = 0.12) -> Clip:
     """A river past stones; parameters as `running`."""
-    return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, relief=0.10)
+    return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, relief=0.06)
 
 
-def reflected(slope_x: np.ndarray, slope_y: np.ndarray, tone: float) -> np.ndarray:
-    """Display grey of a water surface of these slopes under a sky that is bright in the upper left.
+def reflected(slope_x: np.ndarray, slope_y: np.ndarray, tone: float, towards: float = UPPER_LEFT) -> np.ndarray:
+    """Display grey of a water surface of these slopes under a sky that is bright in the direction `towards`, radians.
 
     What faces away reflects dark trees, what faces the light a bright sky, and steep facets the sun.
     """
-    facing = 0.6 * slope_x - 0.8 * slope_y
-    return (tone * (1 + 0.9 * np.tanh(4 * facing)) + 0.3 * smooth_step(0.05, 0.45, facing)
-            + 0.5 * smooth_step(0.42, 0.62, facing))
+    facing = -np.float32(np.cos(towards)) * slope_x - np.float32(np.sin(towards)) * slope_y
+    sky = smooth_step(-0.3, 0.5, facing)
+    return 0.5 * tone + (0.42 + 0.5 * tone) * sky + 0.4 * smooth_step(0.32, 0.5, facing)
 
 
 def _period(frames: int) -> int:
-    """Frames after which carrying begins again: a divisor of T near 24."""
-    return min((d for d in range(8, frames + 1) if frames % d == 0), key=lambda d: abs(d - 24))
+    """Frames after which carrying begins again: a divisor of T near 16."""
+    return min((d for d in range(8, frames + 1) if frames % d == 0), key=lambda d: abs(d - 16))
 
 
 def _stones(shape: tuple[int, int], random: np.random.Generator, count: int, scale: float) -> rock.Stones:
@@ -123,9 +130,9 @@ def _stones(shape: tuple[int, int], random: np.random.Generator, count: int, sca
 
 def _current(shape: tuple[int, int], frames: int, U: np.ndarray, standing: rock.Stones, speed: float,
              random: np.random.Generator, scale: float) -> Current:
-    steady = past_stones(U, standing.distance, 26 * scale)
-    strength = (0.5 + 1.5 * _lee(standing.distance, U, 70 * scale)) * smooth_step(0, 8 * scale, standing.distance)
-    return Current(steady, eddies(shape, frames, U, 34 * scale, speed, strength, random))
+    steady = past_stones(U, standing.distance)
+    strength = (0.6 + 1.2 * _lee(standing.distance, U, 70 * scale)) * smooth_step(0, 8 * scale, standing.distance)
+    return Current(steady, eddies(shape, frames, U, 70 * scale, speed, strength, random))
 
 
 def _lee(distance: np.ndarray, U: np.ndarray, length: float) -> np.ndarray:
@@ -142,7 +149,7 @@ def _lee(distance: np.ndarray, U: np.ndarray, length: float) -> np.ndarray:
 def _standing_waves(shape: tuple[int, int], random: np.random.Generator, direction: float, scale: float) -> np.ndarray:
     """Height of the waves that stand over the bed, crests across the current, deviation 1."""
     n = 512
-    tile = noise((n, n), random, (26 * scale, 60 * scale), falloff=1.6) * (
+    tile = noise((n, n), random, (34 * scale, 70 * scale), falloff=2.2) * (
         1 + 0.6 * noise((n, n), random, 120 * scale, falloff=2))
     y, x = np.mgrid[: shape[0], : shape[1]]
     c, s = np.cos(direction), np.sin(direction)
@@ -162,14 +169,14 @@ def _breaking(bed: np.ndarray, distance: np.ndarray, U: np.ndarray, white: float
     ahead = U / np.hypot(*U)
     slope_y, slope_x = np.gradient(ndimage.gaussian_filter(distance, 2))
     sides = np.abs(slope_x * ahead[1] - slope_y * ahead[0])
-    rims = np.exp(-np.abs(distance) / (4 * scale)) * (0.35 + 0.65 * sides)
+    rims = 0.7 * np.exp(-np.abs(distance) / (2.5 * scale)) * sides**2
     return np.clip(broken + rims, 0, 1).astype(np.float32)
 
 
 def _foam(current: Current, breaking: np.ndarray, frames: int, random: np.random.Generator,
           scale: float) -> np.ndarray:
     """Density of foam in each frame, (T, Y, X): born where waves break, carried, fading; on every second pixel."""
-    life = min(22.0, frames / 5)  # after T frames nothing is left of what was before the first
+    life = min(30.0, frames / 5)  # after T frames nothing is left of what was before the first
     coarse = breaking[::2, ::2]
     grid = Grid(coarse.shape, "clamp")
     gusts = [noise(coarse.shape, random, 24 * scale, falloff=1.2) for _ in range(4)]
@@ -181,7 +188,7 @@ def _foam(current: Current, breaking: np.ndarray, frames: int, random: np.random
         moved = grid.gather(density, grid.departure(opencl.to_device(v))).get()
         a, b = turn * t * round(frames / 32), turn * t * round(frames / 14)
         gust = 1 + 0.6 * (np.cos(a) * gusts[0] + np.sin(a) * gusts[1] + np.cos(b) * gusts[2] + np.sin(b) * gusts[3])
-        now = moved * np.float32(np.exp(-1 / life)) + coarse * np.maximum(gust, 0).astype(np.float32) * 0.16
+        now = moved * np.float32(np.exp(-1 / life)) + coarse * np.maximum(gust, 0).astype(np.float32) * 0.13
         now = np.minimum(now, 1)
         density = opencl.to_device(now.astype(np.float32))
         if t >= 0:
