@@ -14,7 +14,7 @@ from scipy import ndimage
 from synth import opencl
 from synth.noise import curl
 from synth.photo.carried import sampled
-from synth.photo.tiles import noise
+from synth.photo.tiles import enlarged, noise
 from synth.projection import project
 
 
@@ -51,8 +51,7 @@ def past_stones(U: np.ndarray, distance: np.ndarray) -> np.ndarray:
     v = project(np.pad(uniform, ((margin, margin), (margin, margin), (0, 0)), mode="edge"), "open",
                 np.pad(coarse, margin, mode="edge"))[margin:-margin, margin:-margin]
     v = ndimage.gaussian_filter(v, (SMOOTH * len(v), SMOOTH * len(v), 0), mode="nearest")
-    fine = ndimage.zoom(v, (4, 4, 1), order=1, grid_mode=True, mode="nearest")
-    return np.ascontiguousarray(fine[: distance.shape[0], : distance.shape[1]], np.float32)
+    return np.ascontiguousarray(np.moveaxis(enlarged(np.moveaxis(v, -1, 0), 4, distance.shape), 0, -1))
 
 
 def eddies(shape: tuple[int, int], frames: int, U: np.ndarray, size: float, speed: float, strength: np.ndarray,

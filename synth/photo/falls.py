@@ -16,7 +16,7 @@ from synth import opencl
 from synth.photo import drops, rock
 from synth.photo.carried import sampled
 from synth.photo.clip import Clip, eight_bit
-from synth.photo.tiles import lace, noise, rng, smooth_step
+from synth.photo.tiles import enlarged, lace, noise, rng, smooth_step
 
 PER_FRAME = 4  # rows of a tile of emission in a frame
 START = 0.45  # speed at a lip, in terminal speeds
@@ -266,8 +266,7 @@ def _mist(ground: Bed, motion: Motion, envelope: np.ndarray, random: np.random.G
                                     mode=("wrap", "nearest", "nearest"))
     out = np.empty((frames, *shape), np.float32)
     for t in range(frames):
-        fine = ndimage.zoom(light[t], 4, order=1, grid_mode=True, mode="nearest")[: shape[0], : shape[1]]
-        out[t] = 0.75 * (1 - np.exp(-fine))
+        out[t] = 0.75 * (1 - np.exp(-enlarged(light[t], 4, shape)))
     return out
 
 

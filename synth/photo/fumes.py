@@ -18,8 +18,9 @@ from synth.photo import drops, rock
 from synth.photo.carried import carried, sampled
 from synth.photo.clip import Clip, eight_bit
 from synth.photo.current import Current, eddies
-from synth.photo.tiles import noise, rng, smooth_step
+from synth.photo.tiles import enlarged, noise, rng, smooth_step
 
+NIGHT = 0.0005  # light that is left where no fire is seen
 COLUMNS = 256  # of a tile of what leaves a source
 WIDENING = 1.1  # of a plume over the picture's height, in widths
 
@@ -49,12 +50,6 @@ def labels(velocity: Callable[[int], np.ndarray], frames: int, source: float,
         state[..., 1] = np.where(below, (y - source) / v[..., 1], state[..., 1])
         if t >= 0:
             yield state[..., 0].copy(), state[..., 1].copy()
-
-
-def doubled(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Values on every second pixel, (Y / 2, X / 2), on all pixels of `shape` (Y, X), bilinear."""
-    fine = ndimage.zoom(values, 2, order=1, grid_mode=True, mode="nearest")
-    return np.asarray(fine[: shape[0], : shape[1]])
 
 
 def left(tile: np.ndarray, from_x: np.ndarray, age: np.ndarray, frame: int, frames: int) -> np.ndarray:
@@ -96,7 +91,7 @@ def fire(seed: int, frames: int, size: tuple[int, int], *, width: float = 0.5, s
     """
     shape = size[1], size[0]
     scale = shape[0] / 240
-    source = 0.10 * shape[0]
+    source = 0.07 * shape[0]
     life = min(life, 0.9 * frames) * scale**0.5
     x = np.arange(shape[1], dtype=np.float32)
     half = (-(-shape[0] // 2), -(-shape[1] // 2))
@@ -106,19 +101,19 @@ def fire(seed: int, frames: int, size: tuple[int, int], *, width: float = 0.5, s
         random = rng(seed, 41, layer)
         air = rising(half, frames, 0.23 * speed * scale, 0.5 * speed * scale, 45 * scale, 0.5,
                      0.065 * speed * scale, 24 * scale, 0.5 * wind * scale, random)
-        velocity += np.stack([doubled(part, shape) for part in np.moveaxis(2 * air.mean(), -1, 0)], -1) / 3
+        velocity += 2 / 3 * np.moveaxis(enlarged(np.moveaxis(air.mean(), -1, 0), 2, shape), 0, -1)
         rows = 4 * frames
-        fuel = (0.8 * noise((rows, COLUMNS), random, (30 * scale, 4 * 9), falloff=1.0)
-                + 0.5 * noise((rows, COLUMNS), random, (11 * scale, 4 * 5), falloff=1.0, finest=3))
-        folds = np.exp(-np.abs(noise((rows, COLUMNS), random, (16 * scale, 4 * 8), falloff=0.9, finest=2.5)) * 2.2)
+        fuel = (0.8 * noise((rows, COLUMNS), random, (38 * scale, 4 * 10), falloff=1.0)
+                + 0.5 * noise((rows, COLUMNS), random, (13 * scale, 4 * 5), falloff=1.0, finest=3))
+        folds = np.exp(-np.abs(noise((rows, COLUMNS), random, (20 * scale, 4 * 9), falloff=0.9, finest=2.5)) * 2.2)
         tile = opencl.to_device(np.stack([fuel, folds]).astype(np.float32))
         place = np.abs(x - shape[1] / 2 + random.normal(0, 0.04) * shape[1]) / (0.5 * width * shape[1])
         beds = 0.5 * noise((4, shape[1]), random, (50 * scale, 4), falloff=0.8, finest=1)[0] + 0.9 - 1.1 * place**2
         for t, label in enumerate(labels(air.velocity, frames, 0.5 * source, round(life) + 6)):
-            from_x, age = 2 * doubled(label[0], shape), doubled(label[1], shape)
+            from_x, age = 2 * enlarged(label[0], 2, shape), enlarged(label[1], 2, shape)
             fuelled, folded = left(tile, from_x, age, t, frames)
             there = np.interp(np.arange(shape[1]) + from_x, x, beds).astype(np.float32)
-            lasts = life * np.clip(0.45 * (there + 0.62 * fuelled), 0.01, 1.0)
+            lasts = life * np.clip(0.55 * (there + 0.6 * fuelled), 0.01, 1.0)
             left_over = 1 - np.maximum(age + 1, 1) / lasts
             flame = smooth_step(0, 0.22, left_over) * smooth_step(-3.5, 1.0, age)
             heat[t] += flame * (0.16 + 0.85 * folded**1.5) * (0.35 + 0.65 * left_over)
@@ -134,9 +129,8 @@ def _fire_pictures(seed: int, frames: int, shape: tuple[int, int], heat: np.ndar
     chroma = np.empty((frames, *shape, 3), np.uint8)
     coverage = np.zeros(shape, np.float32)
     for t in range(frames):
-        near = ndimage.zoom(ndimage.gaussian_filter(heat[t][::4, ::4], 6 * scale), 4, order=1, grid_mode=True,
-                            mode="nearest")[: shape[0], : shape[1]]
-        seen = heat[t] * (1 - logs) + 0.35 * near * grey + 0.06 * near + 1.2 * np.minimum(sparks[t], 1)
+        near = enlarged(ndimage.gaussian_filter(heat[t][::4, ::4], 6 * scale), 4, shape)
+        seen = heat[t] * (1 - logs) + 0.35 * near * grey + 0.06 * near + NIGHT + 1.2 * np.minimum(sparks[t], 1)
         # the hotter, the whiter: each colour of a black body saturates later than the one before
         light = np.stack([1 - np.exp(-rate * seen ** power) for rate, power in ((3.4, 1.0), (1.6, 1.3), (0.55, 1.9))], -1)
         chroma[t] = eight_bit(np.clip(light, 0, 1) ** (1 / 1.8))
@@ -167,7 +161,7 @@ def _logs(shape: tuple[int, int], random: np.random.Generator, width: float,
         cx = shape[1] / 2 + random.uniform(-0.45, 0.45) * width * shape[1]
         cy = source * random.uniform(0.5, 1.1)
         along = (x - cx) * np.cos(turn) + (y - cy) * np.sin(turn)
-        across = ((y - cy) * np.cos(turn) - (x - cx) * np.sin(turn)) / (0.045 * shape[0] * random.uniform(0.6, 1))
+        across = ((y - cy) * np.cos(turn) - (x - cx) * np.sin(turn)) / (0.038 * shape[0] * random.uniform(0.6, 1))
         inside = smooth_step(1.05, 0.9, np.abs(across)) * (np.abs(along) < 0.32 * width * shape[1])
         hidden = np.maximum(hidden, inside)
         grey = grey * (1 - inside) + inside * bark * (0.15 + 0.55 * np.clip(0.2 + 0.8 * across, 0, 1))
@@ -200,8 +194,7 @@ def shaded(density: np.ndarray, heads: np.ndarray, scale: float) -> np.ndarray:
     behind = np.zeros_like(coarse)
     for k in range(1, 13):
         behind += ndimage.shift(coarse, (0, -1.1 * k * scale, 0.8 * k * scale), order=1) / 12
-    shadow = ndimage.zoom(np.exp(-1.5 * behind), (1, 4, 4), order=1, grid_mode=True, mode="nearest")
-    shadow = shadow[:, : density.shape[1], : density.shape[2]]
+    shadow = enlarged(np.exp(-1.5 * behind), 4, density.shape[1:])
     surface = ndimage.gaussian_filter(heads + 0.7 * np.minimum(density, 2.5), (0, 1.2, 1.2)) * 6 * scale
     slope_y, slope_x = np.gradient(surface, axis=(1, 2))
     facing = (0.66 + 0.45 * slope_x - 0.6 * slope_y) / np.sqrt(1 + slope_x**2 + slope_y**2)

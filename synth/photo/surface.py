@@ -16,7 +16,7 @@ from synth.photo.carried import carried
 from synth.photo.clip import Clip, eight_bit
 from synth.photo.current import Current, eddies, past_stones
 from synth.photo.sea import sea
-from synth.photo.tiles import lace, noise, rng, smooth_step
+from synth.photo.tiles import enlarged, lace, noise, rng, smooth_step
 
 TILE = 192
 UPPER_LEFT = 2.2  # where light comes from, radians
@@ -29,7 +29,7 @@ def lit_along(direction: float) -> float:
 
 
 def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, speed: float, stones: int,
-            white: float, relief: float, ripples: float = 0.16, eddying: float = 0.14, tone: float = 0.14) -> Clip:
+            white: float, relief: float, ripples: float = 0.14, eddying: float = 0.1, tone: float = 0.14) -> Clip:
     """Running water.
 
     direction  of the current, radians counter-clockwise from x
@@ -53,8 +53,8 @@ def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, 
 
     foam_tile = lace(256, rng(seed, 15), 20 * scale)
     boil = noise((256, 256), rng(seed, 16), 15 * scale, falloff=1.0, finest=1.5)
-    waves = sea(TILE, frames, rng(seed, 17), length=36 * scale, wind=direction + 0.6, gravity=0.12 * scale,
-                slope=ripples, spread=1.0, shortest=3.0)
+    waves = sea(TILE, frames, rng(seed, 17), length=44 * scale, wind=direction + 0.6, gravity=0.12 * scale,
+                slope=ripples, spread=0.3, shortest=4.0)
     slopes = np.stack([waves.slopes(t) for t in range(frames)], 1)
     tiles = [opencl.to_device(tile) for tile in (foam_tile[None], _lit(boil)[None], *slopes)]
     # along the current foam is drawn out
@@ -89,7 +89,7 @@ def white_water(seed: int, frames: int, size: tuple[int, int], *, direction: flo
                 stones: int = 1, white: float = 0.6) -> Clip:
     """Rapids: standing waves that break; parameters as `running`."""
     return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, relief=0.2,
-                   ripples=0.2, eddying=0.16)
+                   ripples=0.16, eddying=0.12)
 
 
 def river(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0.2, speed: float = 2.2,
@@ -192,8 +192,7 @@ def _foam(current: Current, breaking: np.ndarray, frames: int, random: np.random
         now = np.minimum(now, 1)
         density = opencl.to_device(now.astype(np.float32))
         if t >= 0:
-            out[t] = ndimage.zoom(now, 2, order=1, grid_mode=True, mode="nearest")[
-                : breaking.shape[0], : breaking.shape[1]]
+            out[t] = enlarged(now, 2, breaking.shape)
     return out
 
 

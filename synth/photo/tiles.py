@@ -72,3 +72,15 @@ def smooth_step(low: float, high: float, x: np.ndarray) -> np.ndarray:
     """From 0 at `low` to 1 at `high`, level beyond, with level ends."""
     t = np.clip((x - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
+
+
+def enlarged(values: np.ndarray, factor: int, shape: tuple[int, int]) -> np.ndarray:
+    """Values (..., y, x) float32 of every factor-th pixel on all pixels of `shape` (Y, X), bilinear."""
+    for axis, n in ((-2, shape[0]), (-1, shape[1])):
+        old = values.shape[axis]
+        position = np.clip((np.arange(n) + 0.5) / factor - 0.5, 0, old - 1)
+        base = np.minimum(position.astype(int), max(old - 2, 0))
+        part = (position - base).astype(np.float32)
+        part = part[:, None] if axis == -2 else part
+        values = values.take(base, axis) * (1 - part) + values.take(base + (old > 1), axis) * part
+    return values
