@@ -20,6 +20,7 @@ In the order data passes through them:
     beads           particles of the plane as beads on paper, around obstacles
     tonemap         linear light to display values, and these to eight bits
     layout          panels, labels, insets and legends as one figure
+    contact_sheet   clips of fluids on one sheet
 
 Fields and densities have y up, row 0 the lowest; pictures have their top row first. Pictures are linear Rec.709 light,
 which `tonemap` turns into sRGB display values in [0, 1]; `lic` and `arrows` give display values at once.

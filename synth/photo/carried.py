@@ -25,7 +25,8 @@ PHASES = 3
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The state of one frame: displacement (Y, X, 2 * phases) on the device, pixels; weights and beginnings (phases)."""
+    """The state of a frame: displacement (Y, X, 2 P) on the device, pixels; weight and number of the beginning of
+    each of P phases."""
 
     frame: int
     displacement: Any
@@ -97,3 +98,24 @@ def sampled(tile: Any, displacement: Any, phases: np.ndarray, slices: np.ndarray
         *np.ravel(np.eye(2) if A is None else A).astype(np.float32),
         np.int32(tile.shape[1]), np.int32(tile.shape[2]), np.int32(width), np.int32(height))
     return out.get()
+
+
+def sampled_reference(tile: np.ndarray, displacement: np.ndarray, phases: np.ndarray, slices: np.ndarray,
+                      A: np.ndarray | None = None) -> np.ndarray:
+    """`sampled` in NumPy."""
+    rows, columns = tile.shape[1:]
+    y, x = np.mgrid[: displacement.shape[0], : displacement.shape[1]].astype(np.float32)
+    (a, b), (c, d) = np.asarray(np.eye(2) if A is None else A, np.float32)
+    out = np.zeros((len(phases), *x.shape), np.float32)
+    for f, part in enumerate(slices):
+        for i, (offset_x, offset_y, weight) in enumerate(phases[f].astype(np.float32)):
+            px, py = x + displacement[..., 2 * i], y + displacement[..., 2 * i + 1]
+            u, v = a * px + b * py + offset_x, c * px + d * py + offset_y
+            x0, y0 = np.floor(u), np.floor(v)
+            tx, ty = u - x0, v - y0
+            c0, r0 = x0.astype(int) % columns, y0.astype(int) % rows
+            c1, r1 = (c0 + 1) % columns, (r0 + 1) % rows
+            t = tile[int(part)]
+            low, high = (1 - tx) * t[r0, c0] + tx * t[r0, c1], (1 - tx) * t[r1, c0] + tx * t[r1, c1]
+            out[f] += weight * ((1 - ty) * low + ty * high)
+    return out

@@ -6,6 +6,8 @@ Pictures alone do not show a thin line at the edge where a fall should be; `faul
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from scipy import ndimage
 
@@ -45,7 +47,7 @@ def drift(clip: Clip) -> float:
 def jump(clip: Clip) -> float:
     """The mean difference of the last frame and the first, over the median of those from frame to frame."""
     luma = clip.luma.astype(np.int16)
-    steps = np.array([np.abs(after - before).mean() for before, after in zip(luma, luma[1:], strict=False)])
+    steps = np.array([np.abs(after - before).mean() for before, after in itertools.pairwise(luma)])
     return float(np.abs(luma[0] - luma[-1]).mean() / max(np.median(steps), 1e-6))
 
 
@@ -59,8 +61,8 @@ def detail(clip: Clip) -> float:
 def turn(clip: Clip, pairs: int = 16) -> float:
     """The median angle, degrees, between the velocity and what optical flow sees on the mean of `pairs` frames.
 
-    Only where fluid covers LEAST_COVERAGE and moves at LEAST_SPEED; the flow is Dense Inverse Search [Kroeger et al.
-    2016] on clips enlarged to at least 240 rows, its mean weighted by its own speed.
+    Only where fluid covers LEAST_COVERAGE, moves at LEAST_SPEED and changes by MOVES; 180 where there is no such pixel.
+    The flow is Dense Inverse Search [Kroeger et al. 2016].
     """
     flow = seen(clip, pairs)
     v = clip.velocity

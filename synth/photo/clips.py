@@ -58,16 +58,13 @@ def catalogue(count: int = 150) -> list[Recipe]:
     anywhere: the clips of a longer list fill the gaps of a shorter one.
     """
     made = dict.fromkeys(SHARES, 0)
-    total = sum(SHARES.values())
     recipes = []
-    for number in range(count):
-        # whoever is furthest behind its share is next; nobody goes twice before all went once
-        family = min(made, key=lambda name: (made[name] > 0 and number >= len(made), made[name] / SHARES[name])
-                     if number >= len(made) else (made[name] > 0, -SHARES[name]))
-        index = made[family]
+    for _ in range(count):
+        # nobody goes twice before all went once; then whoever is furthest behind its share is next
+        family = min(SHARES, key=lambda name: (made[name] > 0, (made[name] + 0.5) / SHARES[name]))
+        seed = 1000 * list(SHARES).index(family) + made[family]
+        recipes.append(Recipe(family, seed, VARIATIONS[family](_spread(made[family]))))
         made[family] += 1
-        recipes.append(Recipe(family, 1000 * list(SHARES).index(family) + index, VARIATIONS[family](_spread(index))))
-    assert total == 150
     return recipes
 
 
@@ -83,8 +80,8 @@ def _between(low: float, high: float, u: float) -> float:
 
 
 def _fall(u: np.ndarray) -> dict[str, Any]:
-    return {"width": _between(0.3, 1.4, u[0]), "speed": _between(3.0, 6.5, u[1]), "ledges": int(5 * u[2]),
-            "density": _between(0.3, 0.75, u[3]), "lean": _between(-0.45, 0.45, u[4]),
+    return {"width": _between(0.45, 1.6, u[0]), "speed": _between(3.0, 6.5, u[1]), "ledges": int(5 * u[2]),
+            "density": _between(0.35, 0.8, u[3]), "lean": _between(-0.45, 0.45, u[4]),
             "lip": 1.05 if u[5] < 0.7 else _between(0.8, 0.95, (u[5] - 0.7) / 0.3),
             "foot": -0.1 if u[6] < 0.4 else _between(0.08, 0.25, (u[6] - 0.4) / 0.6),
             "tone": _between(0.14, 0.34, (u[0] + u[3]) % 1)}

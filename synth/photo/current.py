@@ -17,7 +17,6 @@ from synth.photo.carried import sampled
 from synth.photo.tiles import enlarged, noise
 from synth.projection import project
 
-
 SMOOTH = 0.03
 
 

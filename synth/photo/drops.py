@@ -79,7 +79,7 @@ def streaks_reference(drops: Drops, frames: int, shape: tuple[int, int], shutter
     """`streaks` in NumPy, droplet by droplet."""
     light = np.zeros((frames, *shape), np.int64)
     for i in range(len(drops.x)):
-        one = Drops(*(np.float64(column[i]) for column in drops))
+        one = Drops(*(np.asarray(column[i], np.float64) for column in drops))
         for t in range(frames):
             age = (t - one.birth) % frames
             while age < one.life:

@@ -16,13 +16,15 @@ from synth import opencl
 from synth.photo import drops, rock
 from synth.photo.carried import sampled
 from synth.photo.clip import Clip, eight_bit
-from synth.photo.tiles import enlarged, lace, noise, rng, smooth_step
+from synth.photo.tiles import enlarged, lace, noise, normal, rng, smooth_step
 
 PER_FRAME = 4  # rows of a tile of emission in a frame
+COLUMNS = 256  # of such a tile, and of the pool's
 START = 0.45  # speed at a lip, in terminal speeds
 COVERED = 0.05  # where water covers less, nothing is said to move
 SHUTTER = 0.6  # frames
 POOL = 0.9  # speed of foam in the pool, pixels per frame at a picture 240 high
+NEARER = 0.02  # growth of foam for each pixel that it comes nearer, at a picture 240 high
 FLAT = 2.5  # the pool is seen from so low that it is this much shorter than wide
 
 
@@ -40,7 +42,7 @@ class Motion(NamedTuple):
         return times, self.terminal * times - (1 - START) * self.terminal * decayed
 
     def speed(self, time: np.ndarray) -> np.ndarray:
-        """Speed `time` frames after the lip."""
+        """Speed `time` frames after the lip, pixels per frame."""
         return self.terminal * (1 - (1 - START) * np.exp(-self.drag * time))
 
 
@@ -105,61 +107,82 @@ def fall(seed: int, frames: int, size: tuple[int, int], *, width: float = 0.8, s
     random = rng(seed, 1)
     motion = Motion(speed * scale / 11, 1 / 11, speed * scale)
     ground = bed(shape, random, ledges, lip, foot, lean)
-    rows = frames * PER_FRAME
     envelope = _envelope(shape[1], random, width, lean * shape[0] * 0.5)
     times, distances = motion.table(1.5 * shape[0])
     tau = np.interp(ground.fallen, distances, times).astype(np.float32)
     cover = envelope[np.clip(np.rint(ground.s), 0, shape[1] - 1).astype(int)]
     cover = cover + 0.25 * noise(shape, random, (14 * scale, 60 * scale), falloff=0.8)
-    cover[ground.fallen < 0] = -3
-    cover -= 3 * smooth_step(-3, 5, ground.foot - np.arange(shape[0], dtype=np.float32))[:, None]
+    cover[ground.fallen < 0] = -9
+    cover -= 9 * smooth_step(-3, 5, ground.foot - np.arange(shape[0], dtype=np.float32))[:, None]
 
-    alpha, light = np.zeros((frames, *shape), np.float32), np.zeros((frames, *shape), np.float32)
-    for layer in range(2):
-        tile = _emission((rows, 256), rng(seed, 2, layer), scale)
-        shade = _side_lit(tile)
-        displacement = _places(ground, tau, rng(seed, 3, layer), rows)
-        offsets = np.zeros((frames, 1, 3), np.float32)
-        offsets[:, 0, 1] = np.arange(frames) * PER_FRAME
-        offsets[:, 0, 2] = 1
-        on_device, no_slice = opencl.to_device(displacement), np.zeros(frames, np.int32)
-        e = sampled(opencl.to_device(tile[None]), on_device, offsets, no_slice)
-        bright = sampled(opencl.to_device(shade[None]), on_device, offsets, no_slice)
-        thinned = 0.35 * np.log(motion.speed(tau) / motion.speed(np.float32(0)))
-        e *= np.float32(0.75)
-        e += (cover + 1.6 * (density - 0.5) - thinned).astype(np.float32)
-        a = (0.9 if layer else 0.75) * smooth_step(-0.35, 1.3, e)
-        light = light * (1 - a) + a * (0.66 + 0.10 * layer + 0.17 * bright)
-        alpha += a * (1 - alpha)
-    water = _droplets(ground, motion, _emission((rows, 256), rng(seed, 2, 1), scale), envelope, rng(seed, 4), frames,
-                      density, spray, lean)
-    shot = drops.streaks(water, frames, shape, SHUTTER)
-    thrown = _splashes(ground, motion, envelope, rng(seed, 5), frames, spray * density, lean)
-    foam = drops.streaks(thrown, frames, shape, SHUTTER)
-    back = _ground(ground, envelope, rng(seed, 6), shape, tone, frames)
+    alpha, light = _sheets(ground, motion, tau, cover + 1.6 * (density - 0.5), seed, frames)
+    front = _emission((frames * PER_FRAME, COLUMNS), rng(seed, 2, 1), scale)  # of the sheet in front
+    shot = drops.streaks(_droplets(ground, motion, front, envelope, rng(seed, 4), frames, density, spray, lean),
+                         frames, shape, SHUTTER)
+    thrown = drops.streaks(_splashes(ground, motion, envelope, rng(seed, 5), frames, spray * density, lean),
+                           frames, shape, SHUTTER)
+    back = _ground(ground, envelope, rng(seed, 6), tone, frames)
     mist = _mist(ground, motion, envelope, rng(seed, 7), frames, shape, spray * density, lean)
     luma = np.empty((frames, *shape), np.uint8)
     coverage = np.zeros(shape, np.float32)
     for t in range(frames):
         grain = 1 - np.exp(-0.9 * shot[t])
-        flying = 1 - np.exp(-ndimage.gaussian_filter(foam[t], 0.5))
+        flying = 1 - np.exp(-ndimage.gaussian_filter(thrown[t], 0.5))
         grey = back[t] * (1 - alpha[t]) + light[t]
         grey += (0.93 - grey) * np.minimum(grain, 0.95)
         grey += (0.88 - grey) * mist[t]
         grey += (0.95 - grey) * flying
         luma[t] = eight_bit(grey)
         coverage += 1 - (1 - alpha[t]) * (1 - grain) * (1 - flying)
-    coverage /= frames
-    return Clip(luma, _velocity(ground, motion.speed(tau), coverage, scale), coverage)
+    coverage = np.where(np.arange(shape[0])[:, None] < ground.foot, 1, coverage / frames).astype(np.float32)
+    return Clip(luma, _velocity(ground, motion.speed(tau), coverage, frames), coverage)
 
 
-def _velocity(ground: Bed, speed: np.ndarray, coverage: np.ndarray, scale: float) -> np.ndarray:
+def _sheets(ground: Bed, motion: Motion, tau: np.ndarray, cover: np.ndarray, seed: int,
+            frames: int) -> tuple[np.ndarray, np.ndarray]:
+    """Two sheets of water, one before the other: opacity and light (T, Y, X) float32 each.
+
+    tau    (Y, X) frames since the water at a pixel left its lip
+    cover  (Y, X) how much water falls there: 0 the mean, below -1 none
+    """
+    shape = tau.shape
+    thinned = cover - 0.35 * np.log(motion.speed(tau) / motion.speed(np.zeros(1)))
+    alpha, light = np.zeros((frames, *shape), np.float32), np.zeros((frames, *shape), np.float32)
+    phases = np.zeros((frames, 1, 3), np.float32)
+    phases[:, 0, 1] = np.arange(frames) * PER_FRAME
+    phases[:, 0, 2] = 1
+    for layer, (most, grey) in enumerate(((0.75, 0.66), (0.9, 0.76))):
+        tile = _emission((frames * PER_FRAME, COLUMNS), rng(seed, 2, layer), shape[0] / 240)
+        places = opencl.to_device(_places(ground, tau, rng(seed, 3, layer), len(tile)))
+        water, shade = (sampled(opencl.to_device(one[None]), places, phases, np.zeros(frames))
+                        for one in (tile, _side_lit(tile)))
+        sheet = most * smooth_step(-0.35, 1.3, 0.75 * water + thinned.astype(np.float32))
+        light = light * (1 - sheet) + sheet * (grey + 0.17 * shade)
+        alpha += sheet * (1 - alpha)
+    return alpha, light
+
+
+def _velocity(ground: Bed, speed: np.ndarray, coverage: np.ndarray, frames: int) -> np.ndarray:
     """Along the paths of falling water, on which s is the same, and towards the viewer in the pool."""
     slope_y, slope_x = np.gradient(ground.s)
     velocity = np.stack([speed * slope_y / slope_x, -speed], -1).astype(np.float32)
-    velocity[np.arange(len(speed)) < ground.foot] = 0, -POOL * scale
+    y, x = np.mgrid[: speed.shape[0], : speed.shape[1]]
+    near = _near(ground, y)
+    towards = _turns(frames, speed.shape[0]) * COLUMNS / frames / FLAT
+    drawn_apart = (x - 0.5 * speed.shape[1]) / near * NEARER * towards * 240 / speed.shape[0]
+    velocity = np.where((y < ground.foot)[..., None], np.stack([drawn_apart, -towards * near], -1), velocity)
     velocity[(coverage < COVERED) | (ground.fallen < 0)] = 0
-    return velocity
+    return velocity.astype(np.float32)
+
+
+def _near(ground: Bed, y: np.ndarray) -> np.ndarray:
+    """How much larger foam looks at height y of the pool than at the foot of the fall."""
+    return 1 + NEARER * np.clip(ground.foot - y, -4, None) * 240 / len(ground.s)
+
+
+def _turns(frames: int, height: int) -> int:
+    """How often the pool's tile of foam passes in T frames: a whole number, so that it repeats."""
+    return max(1, round(POOL * height / 240 * FLAT * frames / COLUMNS))
 
 
 def _envelope(width: int, random: np.random.Generator, share: float, shift: float) -> np.ndarray:
@@ -168,7 +191,7 @@ def _envelope(width: int, random: np.random.Generator, share: float, shift: floa
     middle = 0.5 * width - shift
     inside = smooth_step(0.0, 0.16 * share * width, 0.5 * share * width - np.abs(x - middle))
     parts = noise((4, width), random, (width / 7, 4), falloff=0.5, finest=1.5)[0]
-    return (0.55 * parts - 3 * (1 - inside)).astype(np.float32)
+    return (0.55 * parts - 5 * (1 - inside)).astype(np.float32)
 
 
 def _emission(shape: tuple[int, int], random: np.random.Generator, scale: float) -> np.ndarray:
@@ -176,8 +199,7 @@ def _emission(shape: tuple[int, int], random: np.random.Generator, scale: float)
     lumps = noise(shape, random, (15 * scale, 12 * PER_FRAME), falloff=0.8, finest=2)
     threads = noise(shape, random, (4 * scale, 9 * PER_FRAME), falloff=0.5, finest=1.6)
     grain = noise(shape, random, (2.2 * scale, 3 * PER_FRAME), falloff=0.3, finest=1.3)
-    total = 0.7 * lumps + 0.8 * threads + 0.6 * grain
-    return (total / total.std()).astype(np.float32)
+    return normal(0.7 * lumps + 0.8 * threads + 0.6 * grain)
 
 
 def _side_lit(tile: np.ndarray) -> np.ndarray:
@@ -190,7 +212,7 @@ def _side_lit(tile: np.ndarray) -> np.ndarray:
 def _places(ground: Bed, tau: np.ndarray, random: np.random.Generator, rows: int) -> np.ndarray:
     """From each pixel to its place in a tile of emission, (Y, X, 2) float32: every section has its own part."""
     y, x = np.mgrid[: tau.shape[0], : tau.shape[1]]
-    starts = random.random((len(ground.tops), 2)) * (256, rows)
+    starts = random.random((len(ground.tops), 2)) * (COLUMNS, rows)
     start = starts[ground.section]
     return np.stack([ground.s + start[..., 0] - x, start[..., 1] - tau * PER_FRAME - y], -1).astype(np.float32)
 
@@ -231,7 +253,7 @@ def _droplets(ground: Bed, motion: Motion, tile: np.ndarray, envelope: np.ndarra
 def _splashes(ground: Bed, motion: Motion, envelope: np.ndarray, random: np.random.Generator, frames: int,
               amount: float, lean: float) -> drops.Drops:
     """Spray that water throws up where it meets a ledge or the pool."""
-    height, width = ground.s.shape
+    width = ground.s.shape[1]
     groups = []
     lines = [*zip(ground.tops[1:], ground.wets[1:], strict=True), (np.full(width, ground.foot), np.ones(width, bool))]
     for line, wet in lines:
@@ -259,8 +281,8 @@ def _mist(ground: Bed, motion: Motion, envelope: np.ndarray, random: np.random.G
     n = len(place)
     puffs = drops.made(
         n, x=(place + lean * (ground.tops[0][place] - ground.foot)) / 4, y=ground.foot / 4,
-        vx=random.normal(0, 0.1 * motion.terminal, n), vy=np.abs(random.normal(0, 0.13 * motion.terminal, n)), gx=0,
-        gy=0, drag=0.12, birth=random.uniform(0, frames, n), life=random.uniform(8, 20, n), weight=0.35, fade=1.0)
+        vx=random.normal(0, 0.05 * motion.terminal, n), vy=np.abs(random.normal(0, 0.05 * motion.terminal, n)), gx=0,
+        gy=0, drag=0.12, birth=random.uniform(0, frames, n), life=random.uniform(8, 20, n), weight=0.8, fade=1.0)
     coarse = (-(-shape[0] // 4) + 1, -(-shape[1] // 4) + 1)
     light = ndimage.gaussian_filter(drops.streaks(puffs, frames, coarse, SHUTTER), (1.0, 1.5, 1.5),
                                     mode=("wrap", "nearest", "nearest"))
@@ -270,31 +292,29 @@ def _mist(ground: Bed, motion: Motion, envelope: np.ndarray, random: np.random.G
     return out
 
 
-def _ground(ground: Bed, envelope: np.ndarray, random: np.random.Generator, shape: tuple[int, int], tone: float,
-            frames: int) -> np.ndarray:
+def _ground(ground: Bed, envelope: np.ndarray, random: np.random.Generator, tone: float, frames: int) -> np.ndarray:
     """Behind the water, (T, Y, X): wet rock, its ledges, and the pool with foam that drifts towards the viewer."""
+    shape = ground.s.shape
+    scale = shape[0] / 240
     still = rock.face(shape, random, tone)
     still = still * (1 + 0.5 * np.exp(-np.abs(ground.fallen) / 2.5) * (ground.section > 0))
     if ground.foot <= 1:
         return np.broadcast_to(still, (frames, *shape))
-    scale = shape[0] / 240
     y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
     shore = ground.foot + 2.5 * scale * noise((4, shape[1]), random, (30 * scale, 4), falloff=0.6, finest=1)[0]
-    deep = np.clip(ground.foot - y, -4, None) / scale
-    near = 1 + 0.02 * deep  # nearer to the viewer, foam looks larger
-    tile = lace(256, random, 22 * scale)
-    places = np.stack([0.5 * shape[1] + (x - 0.5 * shape[1]) / near - x, -FLAT * scale * np.log(near) / 0.02 - y], -1)
-    offsets = np.zeros((frames, 1, 3), np.float32)
-    offsets[:, 0, 1] = np.arange(frames) * POOL * scale * FLAT
-    turns = max(1, round(POOL * scale * FLAT * frames / len(tile)))
-    offsets[:, 0, 1] = np.arange(frames) * turns * len(tile) / frames
-    offsets[:, 0, 2] = 1
-    walls = sampled(opencl.to_device(tile[None]), opencl.to_device(places.astype(np.float32)), offsets,
-                    np.zeros(frames, np.int32))
-    fed = ndimage.gaussian_filter1d(smooth_step(-1.5, 0.5, envelope), 20 * scale)
-    dense = (3.4 * np.exp(-deep / 22) + 0.6) * fed - 1.6
+    near = _near(ground, y)
+    tile = lace(COLUMNS, random, 22 * scale)
+    places = np.stack([0.5 * shape[1] + (x - 0.5 * shape[1]) / near - x, -FLAT * scale * np.log(near) / NEARER - y], -1)
+    phases = np.zeros((frames, 1, 3), np.float32)
+    phases[:, 0, 1] = np.arange(frames) * _turns(frames, shape[0]) * COLUMNS / frames
+    phases[:, 0, 2] = 1
+    walls = sampled(opencl.to_device(tile[None]), opencl.to_device(places.astype(np.float32)), phases,
+                    np.zeros(frames))
+    landing = np.clip(np.rint(ground.s[int(ground.foot)]), 0, shape[1] - 1).astype(int)
+    fed = ndimage.gaussian_filter1d(smooth_step(-1.5, 0.5, envelope[landing]), 20 * scale)
+    dense = (3.4 * np.exp(-(near - 1) / NEARER / 22) + 0.6) * fed - 1.6
     foam = 0.95 * smooth_step(-0.2, 1.6, 0.7 * walls + dense)
     water = 0.15 + 0.04 * noise(shape, random, (50 * scale, 5 * scale), falloff=0.6)
     pool = water + foam * (0.85 - water)
     below = smooth_step(-1.0, 1.0, shore - y)
-    return (still * (1 - below) + pool * below).astype(np.float32)
+    return np.asarray(still * (1 - below) + pool * below, np.float32)

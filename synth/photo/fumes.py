@@ -18,8 +18,9 @@ from synth.photo import drops, rock
 from synth.photo.carried import carried, sampled
 from synth.photo.clip import Clip, eight_bit
 from synth.photo.current import Current, eddies
-from synth.photo.tiles import enlarged, noise, rng, smooth_step
+from synth.photo.tiles import enlarged, noise, normal, rng, smooth_step
 
+BLACK_BODY = ((3.4, 1.0), (1.6, 1.3), (0.55, 1.9))  # red, green, blue: rate and power with which heat saturates
 NIGHT = 0.0005  # light that is left where no fire is seen
 COLUMNS = 256  # of a tile of what leaves a source
 WIDENING = 1.1  # of a plume over the picture's height, in widths
@@ -132,7 +133,7 @@ def _fire_pictures(seed: int, frames: int, shape: tuple[int, int], heat: np.ndar
         near = enlarged(ndimage.gaussian_filter(heat[t][::4, ::4], 6 * scale), 4, shape)
         seen = heat[t] * (1 - logs) + 0.35 * near * grey + 0.06 * near + NIGHT + 1.2 * np.minimum(sparks[t], 1)
         # the hotter, the whiter: each colour of a black body saturates later than the one before
-        light = np.stack([1 - np.exp(-rate * seen ** power) for rate, power in ((3.4, 1.0), (1.6, 1.3), (0.55, 1.9))], -1)
+        light = np.stack([1 - np.exp(-rate * seen**power) for rate, power in BLACK_BODY], -1)
         chroma[t] = eight_bit(np.clip(light, 0, 1) ** (1 / 1.8))
         coverage += 1 - np.exp(-4 * heat[t] * (1 - logs))
     luma = eight_bit(chroma @ np.array([0.2126, 0.7152, 0.0722], np.float32) / 255)
@@ -180,8 +181,7 @@ def billows(shape: tuple[int, int], random: np.random.Generator, size: tuple[flo
     for k in range(octaves):
         octave = noise(shape, random, (size[0] / 2**k, size[1] / 2**k), falloff=3.0, finest=2)
         total += 0.55**k * np.sqrt(octave**2 + 0.05)
-    total -= total.mean()
-    return (total / total.std()).astype(np.float32)
+    return normal(total)
 
 
 def shaded(density: np.ndarray, heads: np.ndarray, scale: float) -> np.ndarray:
@@ -256,7 +256,7 @@ def cloud(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0
     """Clouds that drift before a blue sky, over mountains.
 
     cover      share of the sky that they hide
-    mountains  height of the mountains, share of the picture's; 0: none
+    mountains  mean height of the mountains, share of the picture's
     """
     shape = size[1], size[0]
     scale = shape[0] / 240
@@ -268,7 +268,7 @@ def cloud(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0
         noise((512, 512), random, (150 * scale, 100 * scale), falloff=1.25),
         billows((512, 512), random, (60 * scale, 50 * scale), 4))]
     y = np.arange(shape[0], dtype=np.float32)[:, None]
-    stays = 0.5 * noise(shape, random, (120 * scale, 60 * scale), falloff=1.5) + 1.6 * (cover - 0.5)
+    stays = 0.5 * noise(shape, random, (120 * scale, 60 * scale), falloff=1.5) + 3.0 * (cover - 0.5) + 0.35
     density, heads = np.empty((2, frames, *shape), np.float32)
     for state in carried(air.velocity, frames, _period(frames, 48)):
         large = state.picture(tiles[0], seed + 1)
@@ -278,8 +278,9 @@ def cloud(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0
     light = 0.36 + 0.6 * shaded(density, heads, scale)
     sky = np.broadcast_to(0.46 - 0.12 * y / shape[0], shape)
     grey = sky * (1 - alpha) + light * alpha
-    crest = shape[0] * mountains * (1 + 0.5 * noise((4, shape[1]), random, (shape[1] / 2.5, 4), falloff=1.3, finest=1)[0])
-    land = smooth_step(-0.8, 0.8, crest - y) * (mountains > 0)
+    skyline = noise((4, shape[1]), random, (shape[1] / 2.5, 4), falloff=1.3, finest=1)[0]
+    crest = shape[0] * mountains * (1 + 0.5 * skyline)
+    land = smooth_step(-0.8, 0.8, crest - y)
     veil = 0.5 * alpha * smooth_step(0.3, 1.1, y / np.maximum(crest, 1))  # clouds hang before the tops
     grey = grey * (1 - land) + (rock.face(shape, random, 0.2) * (1 - veil) + light * veil) * land
     coverage = (alpha * (1 - land) + veil * land).mean(0).astype(np.float32)

@@ -6,6 +6,8 @@ and fades; ripples and the foam's holes are carried by the current. All repeat a
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy import ndimage
 
@@ -19,7 +21,6 @@ from synth.photo.sea import sea
 from synth.photo.tiles import enlarged, lace, noise, rng, smooth_step
 
 TILE = 192
-UPPER_LEFT = 2.2  # where light comes from, radians
 
 
 def lit_along(direction: float) -> float:
@@ -51,16 +52,10 @@ def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, 
     breaking = _breaking(bed, standing.distance, U, white, scale)
     density = _foam(current, breaking, frames, rng(seed, 14), scale)
 
-    foam_tile = lace(256, rng(seed, 15), 20 * scale)
-    boil = noise((256, 256), rng(seed, 16), 15 * scale, falloff=1.0, finest=1.5)
-    waves = sea(TILE, frames, rng(seed, 17), length=44 * scale, wind=direction + 0.6, gravity=0.12 * scale,
-                slope=ripples, spread=0.3, shortest=4.0)
-    slopes = np.stack([waves.slopes(t) for t in range(frames)], 1)
-    tiles = [opencl.to_device(tile) for tile in (foam_tile[None], _lit(boil)[None], *slopes)]
+    foam_tile, boil_tile, *slope_tiles = _tiles(seed, frames, direction, ripples, scale)
     # along the current foam is drawn out
     c, s = np.cos(direction), np.sin(direction)
-    turn = np.array([[c, s], [-s, c]])
-    A = np.diag([0.75, 1.1]) @ turn
+    A = np.diag([0.75, 1.1]) @ np.array([[c, s], [-s, c]])
     relief_y, relief_x = (relief * part for part in np.gradient(bed / _steepness(bed)))
     splashes = drops.streaks(_thrown(breaking, U, rng(seed, 18), frames, white, scale), frames, shape, 0.6)
     dry = smooth_step(0.0, -1.5, standing.distance)
@@ -68,13 +63,12 @@ def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, 
     luma = np.empty((frames, *shape), np.uint8)
     for state in carried(current.velocity, frames, _period(frames)):
         t = state.frame
-        walls = state.picture(tiles[0], seed + 1, A)
-        lumps = state.picture(tiles[1], seed + 2)
-        moving = [state.picture(tile, seed + 3, part=t) for tile in tiles[2:]]
+        walls = state.picture(foam_tile, seed + 1, A)
+        lumps = state.picture(boil_tile, seed + 2)
+        moving = [state.picture(tile, seed + 3, part=t) for tile in slope_tiles]
         water = reflected(relief_x + moving[0], relief_y + moving[1], tone, lit_along(direction))
         water *= 1 - 0.35 * rim
-        dense = density[t]
-        foam = smooth_step(0.1, 1.6, (0.8 - 0.5 * dense) * walls + 0.3 * lumps + 2.8 * dense - 0.8)
+        foam = smooth_step(0.1, 1.6, (0.8 - 0.5 * density[t]) * walls + 0.3 * lumps + 2.8 * density[t] - 0.8)
         shade = 0.76 + 0.10 * lumps + 0.05 * walls + 0.5 * np.clip(relief_x * -0.45 + relief_y * 0.6, -0.4, 0.4)
         grey = water + foam * (np.clip(shade, 0.4, 0.97) - water)
         grey += (standing.grey - grey) * dry
@@ -83,6 +77,16 @@ def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, 
     coverage = (1 - dry).astype(np.float32)
     velocity = current.mean() * (coverage > 0.5)[..., None]
     return Clip(luma, velocity, coverage)
+
+
+def _tiles(seed: int, frames: int, direction: float, ripples: float, scale: float) -> list[Any]:
+    """On the device: walls of foam, light on boiling foam, and the slopes of ripples along x and y, T slices each."""
+    foam = lace(256, rng(seed, 15), 20 * scale)
+    boil = _lit(noise((256, 256), rng(seed, 16), 15 * scale, falloff=1.0, finest=1.5))
+    waves = sea(TILE, frames, rng(seed, 17), length=44 * scale, wind=direction + 0.6, gravity=0.12 * scale,
+                slope=ripples, spread=0.3, shortest=4.0)
+    slopes = np.stack([waves.slopes(t) for t in range(frames)], 1)
+    return [opencl.to_device(tile) for tile in (foam[None], boil[None], *slopes)]
 
 
 def white_water(seed: int, frames: int, size: tuple[int, int], *, direction: float = -0.4, speed: float = 3.5,
@@ -98,7 +102,7 @@ def river(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0
     return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, relief=0.06)
 
 
-def reflected(slope_x: np.ndarray, slope_y: np.ndarray, tone: float, towards: float = UPPER_LEFT) -> np.ndarray:
+def reflected(slope_x: np.ndarray, slope_y: np.ndarray, tone: float, towards: float) -> np.ndarray:
     """Display grey of a water surface of these slopes under a sky that is bright in the direction `towards`, radians.
 
     What faces away reflects dark trees, what faces the light a bright sky, and steep facets the sun.
@@ -205,9 +209,10 @@ def _thrown(breaking: np.ndarray, U: np.ndarray, random: np.random.Generator, fr
     y, x = np.unravel_index(places, breaking.shape)
     up = np.abs(random.normal(0, 1.3 * scale, n))
     gravity = 0.3 * scale
-    return drops.made(n, x=x + random.random(n), y=y + random.random(n), vx=U[0] * 0.7 + random.normal(0, 0.6, n) * scale,
-                      vy=U[1] * 0.7 + up, gx=0, gy=-gravity, drag=0.03, birth=random.uniform(0, frames, n),
-                      life=2 * up / gravity + 1, weight=random.gamma(1.0, 0.45, n), fade=0.4)
+    return drops.made(n, x=x + random.random(n), y=y + random.random(n),
+                      vx=U[0] * 0.7 + random.normal(0, 0.6, n) * scale, vy=U[1] * 0.7 + up, gx=0, gy=-gravity,
+                      drag=0.03, birth=random.uniform(0, frames, n), life=2 * up / gravity + 1,
+                      weight=random.gamma(1.0, 0.45, n), fade=0.4)
 
 
 def _lit(tile: np.ndarray) -> np.ndarray:

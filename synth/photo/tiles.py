@@ -57,9 +57,13 @@ def lace(n: int, random: np.random.Generator, size: float) -> np.ndarray:
         scale = size / 2**octave
         first, second = cells((n, n), random, round((n / scale) ** 2))
         total += gain * np.exp(-(second - first) / (0.16 * scale))
-    total = _moved(total, bent) + 0.25 * noise((n, n), random, 3 * size, falloff=0.6)
-    total -= total.mean()
-    return np.ascontiguousarray(total / total.std(), np.float32)
+    bent_walls = _moved(total, bent)
+    return normal(bent_walls + 0.25 * noise((n, n), random, 3 * size, falloff=0.6))
+
+
+def normal(tile: np.ndarray) -> np.ndarray:
+    """The tile with mean 0 and deviation 1, float32."""
+    return np.ascontiguousarray((tile - tile.mean()) / tile.std(), np.float32)
 
 
 def _moved(tile: np.ndarray, by: np.ndarray) -> np.ndarray:
