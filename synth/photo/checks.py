@@ -6,14 +6,13 @@ Pictures alone do not show a thin line at the edge where a fall should be; `faul
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 from scipy import ndimage
 
 from synth.photo.clip import Clip
 
 MOVES = 2.0  # grey levels that a moving pixel deviates by
+NEAR = 4  # frames on either side of the end of a loop
 FINE = 6.0  # pixels: detail is what a blur of this deviation removes
 LEAST_SPEED = 0.3  # pixels per frame; slower directions are not compared
 LEAST_COVERAGE = 0.3
@@ -45,10 +44,14 @@ def drift(clip: Clip) -> float:
 
 
 def jump(clip: Clip) -> float:
-    """The mean difference of the last frame and the first, over the median of those from frame to frame."""
-    luma = clip.luma.astype(np.int16)
-    steps = np.array([np.abs(after - before).mean() for before, after in itertools.pairwise(luma)])
-    return float(np.abs(luma[0] - luma[-1]).mean() / max(np.median(steps), 1e-6))
+    """The mean difference of the last frame and the first, over the median of the NEAR steps before it and after it.
+
+    Not of all steps: the pace of clouds and flames itself changes in the course of a clip.
+    """
+    around = np.roll(clip.luma, NEAR, axis=0)[: 2 * NEAR + 1].astype(np.int16)
+    steps = np.abs(np.diff(around, axis=0)).mean((1, 2))
+    others = np.delete(steps, NEAR - 1)
+    return float(steps[NEAR - 1] / max(np.median(others), 1e-6))
 
 
 def detail(clip: Clip) -> float:

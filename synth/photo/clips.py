@@ -90,7 +90,8 @@ def _fall(u: np.ndarray) -> dict[str, Any]:
 def _running(low: float, high: float, stones: tuple[int, int], white: tuple[float, float]) -> Callable[..., dict]:
     def variation(u: np.ndarray) -> dict[str, Any]:
         return {"direction": _between(-np.pi, np.pi, u[0]), "speed": _between(low, high, u[1]),
-                "stones": stones[0] + int((stones[1] + 1 - stones[0]) * u[2]), "white": _between(*white, u[3])}
+                "stones": stones[0] + int((stones[1] + 1 - stones[0]) * u[2]), "white": _between(*white, u[3]),
+                "tone": _between(0.08, 0.24, u[4])}
 
     return variation
 
@@ -99,8 +100,9 @@ VARIATIONS: dict[str, Callable[[np.ndarray], dict[str, Any]]] = {
     "fall": _fall,
     "white-water": _running(2.4, 4.5, (0, 3), (0.4, 0.9)),
     "river": _running(1.4, 3.0, (2, 8), (0.04, 0.2)),
-    "fire": lambda u: {"width": _between(0.35, 0.9, u[0]), "speed": _between(3.5, 5.5, u[1]),
-                       "life": _between(26, 42, u[2]), "wind": _between(-0.8, 0.8, u[3])},
+    "fire": lambda u: {"width": _between(0.4, 1.0, u[0]), "speed": _between(3.2, 4.8, u[1]),
+                       "life": _between(28, 42, u[2]), "wind": _between(-0.8, 0.8, u[3]),
+                       "closeness": _between(0.9, 1.9, u[4])},
     "smoke": lambda u: {"width": _between(0.16, 0.45, u[0]), "speed": _between(1.5, 3.0, u[1]),
                         "wind": _between(-1.2, 1.2, u[2]), "dark": max(0.0, _between(-0.7, 0.9, u[3]))},
     "cloud": lambda u: {"direction": _between(-np.pi, np.pi, u[0]), "speed": _between(0.7, 2.0, u[1]),

@@ -1,7 +1,7 @@
 """A current past stones that repeats after T frames: a steady flow and eddies that it carries.
 
-Both are the curl of a potential, so nothing diverges [Bridson et al. 2007]. The steady one passes round each stone. The
-eddies are a tile of noise that drifts with the flow and changes on its way; it drifts by whole tiles in T frames.
+The steady one is a uniform flow, projected. The eddies are the curl of a potential [Bridson et al. 2007], a tile of noise
+that drifts with the flow and changes on its way; it drifts by whole tiles in T frames.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from synth.photo.carried import sampled
 from synth.photo.tiles import enlarged, noise
 from synth.projection import project
 
+COARSE = 60  # rows: few enough that no library splits the solver's sums between threads
+MARGIN = 8
 SMOOTH = 0.03
 
 
@@ -39,23 +41,24 @@ class Current:
 def past_stones(U: np.ndarray, distance: np.ndarray) -> np.ndarray:
     """A uniform flow U (2: x, y) past what lies where distance (Y, X) is negative: (Y, X, 2) float32.
 
-    The flow without eddies that does not pass through walls, found on every fourth pixel and smoothed over SMOOTH
-    shares of the picture's height: what lies on the water is turned aside early, as the layer at a wall slows it.
+    The flow without eddies that does not pass through walls, found on about COARSE rows and smoothed over SMOOTH of
+    the picture's height: what lies on the water is turned aside early, as the layer at a wall slows it.
     """
-    coarse = np.ascontiguousarray(distance[::4, ::4] / 4, np.float32)
-    uniform = np.broadcast_to(np.asarray(U, np.float32), (*coarse.shape, 2))
+    U = np.asarray(U, np.float32)
+    factor = max(1, len(distance) // COARSE)
+    coarse = np.ascontiguousarray(distance[::factor, ::factor] / factor, np.float32)
     if not (coarse < 0).any():
-        return np.array(np.broadcast_to(np.asarray(U, np.float32), (*distance.shape, 2)))
-    margin = 12  # the border lets nothing be turned: keep it away
-    v = project(np.pad(uniform, ((margin, margin), (margin, margin), (0, 0)), mode="edge"), "open",
-                np.pad(coarse, margin, mode="edge"))[margin:-margin, margin:-margin]
+        return np.array(np.broadcast_to(U, (*distance.shape, 2)))
+    # a margin, since the flow through the border is free to turn
+    wider = np.pad(coarse, MARGIN, mode="edge")
+    v = project(np.broadcast_to(U, (*wider.shape, 2)), "open", wider)[MARGIN:-MARGIN, MARGIN:-MARGIN]
     v = ndimage.gaussian_filter(v, (SMOOTH * len(v), SMOOTH * len(v), 0), mode="nearest")
-    return np.ascontiguousarray(np.moveaxis(enlarged(np.moveaxis(v, -1, 0), 4, distance.shape), 0, -1))
+    return np.ascontiguousarray(np.moveaxis(enlarged(np.moveaxis(v, -1, 0), factor, distance.shape), 0, -1))
 
 
 def eddies(shape: tuple[int, int], frames: int, U: np.ndarray, size: float, speed: float, strength: np.ndarray,
            random: np.random.Generator) -> np.ndarray:
-    """Potentials (T, Y + 2, X + 2) float32 of eddies `size` pixels wide of rms speed `speed` times strength (Y, X)."""
+    """Potentials (T, Y + 2, X + 2) float32 of eddies about `size` pixels wide of rms speed `speed` times strength (Y, X)."""
     travelled = np.abs(U) * frames
     # a tile of about 256 pixels along each axis, passed a whole number of times
     turns = np.maximum(np.rint(travelled / 256), (travelled > 64) * 1.0)

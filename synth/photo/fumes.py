@@ -82,18 +82,19 @@ def rising(shape: tuple[int, int], frames: int, slow: float, fast: float, over: 
 
 
 def fire(seed: int, frames: int, size: tuple[int, int], *, width: float = 0.5, speed: float = 4.5,
-         life: float = 34.0, wind: float = 0.0) -> Clip:
+         life: float = 34.0, wind: float = 0.0, closeness: float = 1.0) -> Clip:
     """A wood fire in the dark, with sparks.
 
-    width  of the fire, share of the picture's
-    speed  of its flames, pixels per frame at a picture 240 high
-    life   frames after which the hottest have burnt out
-    wind   sideways speed, pixels per frame
+    width      of the fire, share of the picture's
+    speed      of its flames, pixels per frame at a picture 240 high
+    life       frames after which the hottest have burnt out
+    wind       sideways speed, pixels per frame
+    closeness  of the camera: flames and their speeds look that much larger
     """
     shape = size[1], size[0]
-    scale = shape[0] / 240
-    source = 0.07 * shape[0]
-    life = min(life, 0.9 * frames) * scale**0.5
+    scale = shape[0] / 240 * closeness
+    source = 0.07 * shape[0] * closeness
+    life = min(life, 0.9 * frames) * (shape[0] / 240) ** 0.5
     x = np.arange(shape[1], dtype=np.float32)
     half = (-(-shape[0] // 2), -(-shape[1] // 2))
     heat = np.zeros((frames, *shape), np.float32)
@@ -118,25 +119,26 @@ def fire(seed: int, frames: int, size: tuple[int, int], *, width: float = 0.5, s
             left_over = 1 - np.maximum(age + 1, 1) / lasts
             flame = smooth_step(0, 0.22, left_over) * smooth_step(-3.5, 1.0, age)
             heat[t] += flame * (0.16 + 0.85 * folded**1.5) * (0.35 + 0.65 * left_over)
-    return _fire_pictures(seed, frames, shape, heat, velocity, width, source, speed)
+    return _fire_pictures(seed, frames, heat, velocity, width, source, speed * scale)
 
 
-def _fire_pictures(seed: int, frames: int, shape: tuple[int, int], heat: np.ndarray, velocity: np.ndarray,
-                   width: float, source: float, speed: float) -> Clip:
-    """Colours of the heat, with its glow, sparks and logs."""
-    scale = shape[0] / 240
-    sparks = drops.streaks(_sparks(rng(seed, 42), frames, shape, width, source, speed * scale), frames, shape, 0.7)
+def _fire_pictures(seed: int, frames: int, heat: np.ndarray, velocity: np.ndarray, width: float, source: float,
+                   speed: float) -> Clip:
+    """Colours of the heat (T, Y, X), with its glow, sparks and logs; heights in pixels, speed in pixels per frame."""
+    shape = heat.shape[1:]
+    sparks = drops.streaks(_sparks(rng(seed, 42), frames, shape, width, source, speed), frames, shape, 0.7)
     logs, grey = _logs(shape, rng(seed, 43), width, source)
     chroma = np.empty((frames, *shape, 3), np.uint8)
     coverage = np.zeros(shape, np.float32)
     for t in range(frames):
-        near = enlarged(ndimage.gaussian_filter(heat[t][::4, ::4], 6 * scale), 4, shape)
+        near = enlarged(ndimage.gaussian_filter(heat[t][::4, ::4], shape[0] / 40), 4, shape)
         seen = heat[t] * (1 - logs) + 0.35 * near * grey + 0.06 * near + NIGHT + 1.2 * np.minimum(sparks[t], 1)
         # the hotter, the whiter: each colour of a black body saturates later than the one before
         light = np.stack([1 - np.exp(-rate * seen**power) for rate, power in BLACK_BODY], -1)
         chroma[t] = eight_bit(np.clip(light, 0, 1) ** (1 / 1.8))
         coverage += 1 - np.exp(-4 * heat[t] * (1 - logs))
-    luma = eight_bit(chroma @ np.array([0.2126, 0.7152, 0.0722], np.float32) / 255)
+    red, green, blue = np.moveaxis(chroma.astype(np.float32) / 255, -1, 0)
+    luma = eight_bit(0.2126 * red + 0.7152 * green + 0.0722 * blue)
     coverage /= frames
     return Clip(luma, velocity * (coverage > 0.03)[..., None], coverage, chroma)
 
@@ -162,7 +164,7 @@ def _logs(shape: tuple[int, int], random: np.random.Generator, width: float,
         cx = shape[1] / 2 + random.uniform(-0.45, 0.45) * width * shape[1]
         cy = source * random.uniform(0.5, 1.1)
         along = (x - cx) * np.cos(turn) + (y - cy) * np.sin(turn)
-        across = ((y - cy) * np.cos(turn) - (x - cx) * np.sin(turn)) / (0.038 * shape[0] * random.uniform(0.6, 1))
+        across = ((y - cy) * np.cos(turn) - (x - cx) * np.sin(turn)) / (0.5 * source * random.uniform(0.6, 1))
         inside = smooth_step(1.05, 0.9, np.abs(across)) * (np.abs(along) < 0.32 * width * shape[1])
         hidden = np.maximum(hidden, inside)
         grey = grey * (1 - inside) + inside * bark * (0.15 + 0.55 * np.clip(0.2 + 0.8 * across, 0, 1))

@@ -30,17 +30,17 @@ def lit_along(direction: float) -> float:
 
 
 def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, speed: float, stones: int,
-            white: float, relief: float, ripples: float = 0.14, eddying: float = 0.1, tone: float = 0.14) -> Clip:
+            white: float, tone: float, relief: float, ripples: float, eddying: float) -> Clip:
     """Running water.
 
     direction  of the current, radians counter-clockwise from x
     speed      pixels per frame at a picture 240 high
     stones     that stand in it
     white      how much of it foams: 0 hardly any, 0.5 half, 1 nearly all
+    tone       grey of the deep water
     relief     steepness of the standing waves, rms slope
     ripples    steepness of the carried ripples, rms slope
     eddying    rms speed of eddies, speeds of the current
-    tone       grey of the deep water
     """
     shape = size[1], size[0]
     scale = shape[0] / 240
@@ -90,16 +90,17 @@ def _tiles(seed: int, frames: int, direction: float, ripples: float, scale: floa
 
 
 def white_water(seed: int, frames: int, size: tuple[int, int], *, direction: float = -0.4, speed: float = 3.5,
-                stones: int = 1, white: float = 0.6) -> Clip:
+                stones: int = 1, white: float = 0.6, tone: float = 0.14) -> Clip:
     """Rapids: standing waves that break; parameters as `running`."""
-    return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, relief=0.2,
-                   ripples=0.16, eddying=0.12)
+    return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, tone=tone,
+                   relief=0.2, ripples=0.16, eddying=0.12)
 
 
 def river(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0.2, speed: float = 2.2,
-          stones: int = 4, white: float = 0.12) -> Clip:
+          stones: int = 4, white: float = 0.12, tone: float = 0.14) -> Clip:
     """A river past stones; parameters as `running`."""
-    return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, relief=0.06)
+    return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, tone=tone,
+                   relief=0.06, ripples=0.14, eddying=0.1)
 
 
 def reflected(slope_x: np.ndarray, slope_y: np.ndarray, tone: float, towards: float) -> np.ndarray:
