@@ -92,7 +92,7 @@ def bay(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0.8
     centres = random.random((stones, 2)) * shape[::-1]
     standing = rock.stones(shape, random, centres, random.uniform(12, 34, stones) * scale)
     wash = 3.0 * scale * noise(shape, random, 18 * scale, falloff=0.8)
-    weed = 0.035 * noise(shape, random, 26 * scale, falloff=0.7, finest=3)  # on the bed, seen through the water
+    weed = 0.042 * noise(shape, random, 26 * scale, falloff=0.7, finest=3)  # on the bed, seen through the water
     shoal = weed + 0.08 * smooth_step(12 * scale, 0, standing.distance)
     luma = np.empty((frames, *shape), np.uint8)
     wet = np.zeros(shape, np.float32)

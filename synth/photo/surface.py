@@ -21,6 +21,7 @@ from synth.photo.sea import sea
 from synth.photo.tiles import enlarged, lace, noise, rng, smooth_step
 
 TILE = 192
+BOTTOM = 0.042  # deviation of grey that the bed shows through the water
 
 
 def lit_along(direction: float) -> float:
@@ -56,6 +57,7 @@ def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, 
     # along the current foam is drawn out
     c, s = np.cos(direction), np.sin(direction)
     A = np.diag([0.75, 1.1]) @ np.array([[c, s], [-s, c]])
+    bottom = BOTTOM * noise(shape, rng(seed, 19), 22 * scale, falloff=0.9, finest=4)  # stones seen through the water
     relief_y, relief_x = (relief * part for part in np.gradient(bed / _steepness(bed)))
     splashes = drops.streaks(_thrown(breaking, U, rng(seed, 18), frames, white, scale), frames, shape, 0.6)
     dry = smooth_step(0.0, -1.5, standing.distance)
@@ -67,7 +69,7 @@ def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, 
         lumps = state.picture(boil_tile, seed + 2)
         moving = [state.picture(tile, seed + 3, part=t) for tile in slope_tiles]
         water = reflected(relief_x + moving[0], relief_y + moving[1], tone, lit_along(direction))
-        water *= 1 - 0.35 * rim
+        water = np.maximum(water + bottom, 0.02) * (1 - 0.35 * rim)
         foam = smooth_step(0.1, 1.6, (0.8 - 0.5 * density[t]) * walls + 0.3 * lumps + 2.8 * density[t] - 0.8)
         shade = 0.76 + 0.10 * lumps + 0.05 * walls + 0.5 * np.clip(relief_x * -0.45 + relief_y * 0.6, -0.4, 0.4)
         grey = water + foam * (np.clip(shade, 0.4, 0.97) - water)
