@@ -15,9 +15,9 @@ from typing import Literal
 import numpy as np
 
 from synth.photo.appearance import added, average, extended, gains, matched
-from synth.photo.assign import Assigned, Database, Nodes, Settings, Wanted, assign
+from synth.photo.assign import Nodes, Shown, Wanted
 from synth.photo.boundary import dynamic_matte
-from synth.photo.integrate import Differences, Frames, differences, motion_field
+from synth.photo.integrate import Differences, motion_field
 from synth.photo.photograph import carried
 from synth.photo.pieces import Cut
 
@@ -79,68 +79,54 @@ class Target:
         return np.rint(255 * np.clip(self.picture.mean(axis=2), 0, 1)).astype(np.uint8)
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """What is found before the first frame: pieces, their differences, and the motion (Y, X, 2), pixels per frame."""
-
-    of: Nodes
-    found: Assigned
-    differences: Differences
-    motion: np.ndarray
-
-
-def plan(target: Target, database: Database, frames: Frames, cut: Cut, settings: Settings, length: int,
-         seed: int) -> Plan:
-    """§5, and of §6 the integration. Raises ValueError for an empty matte."""
-    shape = (target.picture.shape[0], target.picture.shape[1])
-    of, found = assign(target.grey, target.fluid, database, cut, target.wanted, settings)
-    split = differences(of, found, database, frames, shape, cut, length, seed)
-    return Plan(of, found, split, _motion(target, motion_field(of, found, database, shape, cut)))
-
-
-def _motion(target: Target, motion: np.ndarray) -> np.ndarray:
-    """The pieces' motion, turned towards what the user wants, at the wanted speed; nothing outside the fluid."""
-    speed = np.hypot(motion[..., 0], motion[..., 1]) if target.wanted.speed is None else target.wanted.speed
-    turned = motion
+def motion(target: Target, of: Nodes, shown: Shown, cut: Cut) -> np.ndarray:
+    """The motion (Y, X, 2) float32, pixels per frame: the pieces', turned towards what the user wants, at the wanted
+    speed; zero outside the fluid."""
+    found = motion_field(of, shown, target.matte.shape, cut)  # type: ignore[arg-type]
+    speed = np.hypot(found[..., 0], found[..., 1]) if target.wanted.speed is None else target.wanted.speed
+    turned = found
     if target.wanted.orientation is not None:
-        turned = TOWARDS * speed[..., None] * target.wanted.orientation + (1 - TOWARDS) * motion
+        turned = TOWARDS * speed[..., None] * target.wanted.orientation + (1 - TOWARDS) * found
     size = np.hypot(turned[..., 0], turned[..., 1])
     scaled = turned * (speed / np.maximum(size, 1e-6))[..., None]
     return np.where(target.fluid[..., None] > 0, scaled, 0).astype(np.float32)
 
 
-def composed(target: Target, of: Plan, look: Look, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, seed: int,
+             ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Frame by frame the picture (Y, X, 3) float32 and the matte (Y, X) float32: §6, "Recovery of Color Appearance" on.
+
+    moves  the motion (Y, X, 2) as `motion` gives it
 
     1. The ground: the average, and the photograph carried.
     2. The differences, matched to the target.
     3. Both together, over the background by the matte.
     """
-    length = of.differences.bands.shape[1]
+    length = more.bands.shape[1]
     fluid = extended(target.picture, target.matte)
     # 1. ground
-    still = average(fluid, of.motion) if look.carried < 1 else fluid
-    moving = carried(fluid, of.motion, length, seed, target.frozen) if look.carried > 0 else None
+    still = average(fluid, moves) if look.carried < 1 else fluid
+    moving = carried(fluid, moves, length, seed, target.frozen) if look.carried > 0 else None
     grey = fluid.mean(axis=2)
     strength = look.strength * (1 - look.carried * (1 - CALMED))
     # 2. differences
-    scale = (np.full_like(of.differences.bands[:, 0], 1 / 255) if look.matching == "none"
-             else gains(grey, of.differences.bands, target.fluid))
-    mattes = _mattes(target, of.motion, look, length)
+    scale = (np.full_like(more.bands[:, 0], 1 / 255) if look.matching == "none"
+             else gains(grey, more.bands, target.fluid))
+    covers = mattes(target, moves, look.dynamics, length)
     for frame in range(length):
         ground = still if moving is None else (1 - look.carried) * still + look.carried * moving[frame]
-        more = (scale * of.differences.bands[:, frame]).sum(axis=0) * strength
-        shown = added(ground, more)
+        shown = added(ground, (scale * more.bands[:, frame]).sum(axis=0) * strength)
         if look.matching == "histograms":
             wanted = matched(shown.mean(axis=2), grey, target.fluid, REGION)
             shown = added(shown, wanted - shown.mean(axis=2))
         # 3. together
-        matte = mattes[frame] if target.frozen is None else np.where(target.frozen, np.float32(0), mattes[frame])
+        matte = covers[frame] if target.frozen is None else np.where(target.frozen, np.float32(0), covers[frame])
         behind = target.picture if target.background is None else target.background
         yield (matte[..., None] * shown + (1 - matte[..., None]) * behind).astype(np.float32), matte
 
 
-def _mattes(target: Target, motion: np.ndarray, look: Look, length: int) -> np.ndarray:
-    if look.dynamics == 0:
+def mattes(target: Target, moves: np.ndarray, dynamics: float, length: int) -> np.ndarray:
+    """The matte of each frame: (length, Y, X) float32, moved with `dynamics` (τ of §6); 0: it stands still."""
+    if dynamics == 0:
         return np.broadcast_to(target.matte, (length, *target.matte.shape))
-    return dynamic_matte(target.matte, np.broadcast_to(motion, (length, *motion.shape)), look.dynamics)
+    return dynamic_matte(target.matte, np.broadcast_to(moves, (length, *moves.shape)), dynamics)

@@ -111,6 +111,16 @@ class Wanted(NamedTuple):
     speed: np.ndarray | None = None
 
 
+class Shown(NamedTuple):
+    """What each of P nodes shows: the clip (P,), the version (P,) and the corner (P, 2) of its piece, and the mean
+    motion of its cells (P, CELLS, CELLS, 2), pixels per frame."""
+
+    clip: np.ndarray
+    version: np.ndarray
+    corner: np.ndarray
+    motion: np.ndarray
+
+
 class Assigned(NamedTuple):
     """A piece of the database for each node.
 
@@ -124,6 +134,12 @@ class Assigned(NamedTuple):
     exposure: np.ndarray
     angle: np.ndarray
     energies: tuple[float, float]
+
+    def shown(self, database: Database) -> Shown:
+        """What the nodes show."""
+        pieces, row = database.pieces, self.piece
+        return Shown(database.clip[row], pieces.version[row], pieces.corner[row].astype(np.int64),
+                     pieces.features[row][..., MEAN].astype(np.float32))
 
 
 def nodes(matte: np.ndarray, cut: Cut) -> Nodes:

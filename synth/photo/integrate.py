@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from synth.photo.assign import Assigned, Database, Nodes
-from synth.photo.index import CELLS, MEAN
+from synth.photo.assign import Nodes, Shown
 from synth.photo.pieces import VERSIONS, Cut, pixels
 
 BANDS = 3
@@ -35,8 +34,8 @@ class Differences:
     bands: np.ndarray
 
 
-def differences(of: Nodes, found: Assigned, database: Database, frames: Frames, shape: tuple[int, int], cut: Cut,
-                length: int, seed: int) -> Differences:
+def differences(of: Nodes, shown: Shown, frames: Frames, shape: tuple[int, int], cut: Cut, length: int,
+                seed: int) -> Differences:
     """The differences of the assigned pieces on a target of `shape` (Y, X), `length` frames that loop.
 
     1. Of each node: its piece's frames less their average. A clip that is shorter repeats, one that is longer is cut
@@ -46,17 +45,15 @@ def differences(of: Nodes, found: Assigned, database: Database, frames: Frames, 
     """
     total = np.zeros((BANDS, length, *shape), np.float32)
     share = weights(of, shape, cut)
-    start = phases(of, found, database, seed)
+    start = phases(of, shown, seed)
     for p, (y, x) in enumerate(of.corner.tolist()):
         # 1. differences
-        row = int(found.piece[p])
-        corner = (int(database.pieces.corner[row, 0]), int(database.pieces.corner[row, 1]))
-        clip = frames(int(database.clip[row]))
-        shown = pixels(clip, corner, cut, VERSIONS[int(database.pieces.version[row])]).astype(np.float32)
-        shown = looped(shown - shown.mean(axis=0), length, int(start[p]))
+        corner = (int(shown.corner[p, 0]), int(shown.corner[p, 1]))
+        piece = pixels(frames(int(shown.clip[p])), corner, cut, VERSIONS[int(shown.version[p])]).astype(np.float32)
+        piece = looped(piece - piece.mean(axis=0), length, int(start[p]))
         # 2. bands
         inside, part = _visible(y, x, shape, cut)
-        for band, values in enumerate(bands(shown)):
+        for band, values in enumerate(bands(piece)):
             total[(band, slice(None), *inside)] += share[p][band][part] * values[(slice(None), *part)]
     return Differences(total)
 
@@ -102,15 +99,13 @@ def _mixed(before: np.ndarray, after: np.ndarray, part: np.ndarray) -> np.ndarra
     return np.cos(part * (np.pi / 2)) * before + np.sin(part * (np.pi / 2)) * after
 
 
-def phases(of: Nodes, found: Assigned, database: Database, seed: int) -> np.ndarray:
+def phases(of: Nodes, shown: Shown, seed: int) -> np.ndarray:
     """The frame at which each node's piece begins: (P,) int64. Nodes that show one clip as it is begin together."""
     random = np.random.Generator(np.random.Philox(key=[seed, 0]))
     group = np.arange(len(of.corner))
-    pieces, row = database.pieces, found.piece
     for p, q in of.edges.tolist():
-        a, b = row[p], row[q]
-        moved = pieces.corner[b].astype(int) - pieces.corner[a]
-        if (database.clip[a] == database.clip[b] and pieces.version[a] == pieces.version[b]
+        moved = shown.corner[q] - shown.corner[p]
+        if (shown.clip[p] == shown.clip[q] and shown.version[p] == shown.version[q]
                 and (moved == of.corner[q] - of.corner[p]).all()):
             group[group == group[q]] = group[p]
     start = random.integers(0, 1 << 16, len(group))
@@ -150,7 +145,7 @@ def _visible(y: int, x: int, shape: tuple[int, int], cut: Cut) -> tuple[tuple[sl
     return (whole[0], whole[1]), (part[0], part[1])
 
 
-def motion_field(of: Nodes, found: Assigned, database: Database, shape: tuple[int, int], cut: Cut) -> np.ndarray:
+def motion_field(of: Nodes, shown: Shown, shape: tuple[int, int], cut: Cut) -> np.ndarray:
     """The mean motion of the assigned pieces: (Y, X, 2) float32, pixels per frame; zero where there are none.
 
     "We compute a motion field over the target image, based on the motion fields of assigned video pieces."
@@ -159,11 +154,9 @@ def motion_field(of: Nodes, found: Assigned, database: Database, shape: tuple[in
 
     total, share = np.zeros((*shape, 2)), np.zeros(shape)
     window = np.multiply.outer(_ramp(cut, 1.0), _ramp(cut, 1.0))
-    cells = database.pieces.features[found.piece][..., MEAN].astype(np.float32)
-    assert cells.shape[1] == CELLS
     for p, (y, x) in enumerate(of.corner.tolist()):
         inside, part = _visible(y, x, shape, cut)
-        fine = cv2.resize(cells[p], (cut.size, cut.size), interpolation=cv2.INTER_LINEAR)
+        fine = cv2.resize(shown.motion[p], (cut.size, cut.size), interpolation=cv2.INTER_LINEAR)
         total[inside] += (window[..., None] * fine)[part]
         share[inside] += window[part]
     return (total / np.maximum(share, 1e-12)[..., None]).astype(np.float32)

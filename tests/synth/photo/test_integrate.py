@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from synth.photo.assign import Assigned, Database, nodes
-from synth.photo.index import CELLS, EXPOSURES, FEATURES, Index
+from synth.photo.assign import Shown, nodes
+from synth.photo.index import CELLS
 from synth.photo.integrate import BANDS, bands, differences, looped, motion_field, phases, weights
 from synth.photo.pieces import VERSIONS, Cut
 
@@ -12,18 +12,10 @@ CUT, SHAPE = Cut(32), (64, 96)
 STRAIGHT = VERSIONS.index((1.0, 0.0, False))
 
 
-def database(corners, clips, velocity=(0.0, 0.0)):
+def shown(corners, clips, velocity=(0.0, 0.0)):
     count = len(corners)
-    features = np.zeros((count, CELLS, CELLS, FEATURES), np.float16)
-    features[..., :2] = velocity
-    return Database(np.array(clips, np.int32), Index(
-        np.full(count, STRAIGHT, np.uint8), np.array(corners, np.int16), np.zeros((count, len(EXPOSURES), 5), np.uint8),
-        np.zeros((count, len(EXPOSURES)), np.float16), features), np.zeros((1, 128), np.uint8))
-
-
-def assigned(piece):
-    count = len(piece)
-    return Assigned(np.array(piece), np.zeros(count, int), np.zeros(count), (0.0, 0.0))
+    return Shown(np.array(clips), np.full(count, STRAIGHT), np.array(corners),
+                 np.broadcast_to(np.float32(velocity), (count, CELLS, CELLS, 2)))
 
 
 def noise(seed, frames=12, shape=(80, 112)):
@@ -63,8 +55,7 @@ def test_the_deviation_is_the_same_between_pieces_and_at_their_middles():
     random = np.random.Generator(np.random.Philox(7))
     corners = [(int(y), int(x)) for y, x in random.integers(0, [48, 80], (count, 2))]
     clips = {k: noise(k, 24) for k in range(count)}
-    base = database(corners, range(count))
-    found = differences(of, assigned(range(count)), base, clips.__getitem__, SHAPE, CUT, 24, 1)
+    found = differences(of, shown(corners, range(count)), clips.__getitem__, SHAPE, CUT, 24, 1)
     deviation = found.bands.sum(axis=0).std(axis=0)
     y, x = (np.mgrid[:64, :96] % 16)
     middle, between = (np.abs(y - 8) < 2) & (np.abs(x - 8) < 2), (y < 1) | (x < 1)
@@ -80,10 +71,10 @@ def test_pieces_that_continue_give_the_clip_back():
     of = nodes(inner, CUT)
     kept = ((of.corner >= 0) & (of.corner + 32 <= SHAPE)).all(axis=1)
     assert kept.all()
-    base = database([tuple(c) for c in of.corner], [0] * len(of.corner))
-    start = phases(of, assigned(range(len(of.corner))), base, 5)
+    all_of_it = shown(of.corner, [0] * len(of.corner))
+    start = phases(of, all_of_it, 5)
     assert len(set(start.tolist())) == 1
-    found = differences(of, assigned(range(len(of.corner))), base, lambda _: clip, SHAPE, CUT, 12, 5)
+    found = differences(of, all_of_it, lambda _: clip, SHAPE, CUT, 12, 5)
     expected = np.roll(clip.astype(np.float32) - clip.mean(axis=0, dtype=np.float32), -int(start[0]), axis=0)
     middle = np.s_[:, 28:36, 32:64]
     # weights of equal differences add up to more than one between pieces
@@ -95,8 +86,7 @@ def test_pieces_that_continue_give_the_clip_back():
 
 def test_pieces_that_do_not_continue_begin_at_phases_of_their_own():
     of = nodes(np.ones(SHAPE), CUT)
-    base = database([(0, 0)] * len(of.corner), range(len(of.corner)))
-    start = phases(of, assigned(range(len(of.corner))), base, 5)
+    start = phases(of, shown([(0, 0)] * len(of.corner), range(len(of.corner))), 5)
     assert len(set(start.tolist())) > 0.9 * len(start)
 
 
@@ -123,7 +113,6 @@ def test_the_motion_field_is_that_of_the_pieces_and_none_without():
     matte = np.zeros(SHAPE)
     matte[20:44, 20:50] = 1
     of = nodes(matte, CUT)
-    base = database([(0, 0)] * len(of.corner), [0] * len(of.corner), (1.5, -0.5))
-    found = motion_field(of, assigned(range(len(of.corner))), base, SHAPE, CUT)
+    found = motion_field(of, shown([(0, 0)] * len(of.corner), [0] * len(of.corner), (1.5, -0.5)), SHAPE, CUT)
     np.testing.assert_allclose(found[20:44, 20:50], np.broadcast_to([1.5, -0.5], (24, 30, 2)), atol=1e-3)
     assert not found[:, 90:].any()
