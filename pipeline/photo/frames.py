@@ -45,8 +45,10 @@ def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index:
               "energies": np.array(found.energies), "motion": motion(target, of, shown, cut)}
 
 
-def _composed(scene: PhotoScene, inputs: Inputs, clips: list[str]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """The picture and the matte of each frame, from the first."""
+def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
+               ) -> Iterator[tuple[int, np.ndarray]]:
+    """The fluid of each frame, everywhere, before the matte cuts it (§6)."""
+    from render import tonemap
     from synth.photo.animate import Look, composed
     from synth.photo.assign import Nodes, Shown
     from synth.photo.integrate import differences
@@ -63,31 +65,43 @@ def _composed(scene: PhotoScene, inputs: Inputs, clips: list[str]) -> Iterator[t
 
     rows, columns = target.matte.shape
     more = differences(of, shown, luma, (rows, columns), cut, scene.frames, scene.seed)
-    photo = scene.photo
-    look = Look(photo.carried, photo.strength, photo.matching, photo.dynamics)
-    return composed(target, more, kept["motion"], look, scene.seed)
-
-
-def make_frames(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
-                ) -> Iterator[tuple[int, np.ndarray]]:
-    """The frames, a loop."""
-    from render import tonemap
-
-    for frame, (picture, _) in enumerate(_composed(scene, inputs, clips), start=1):
+    look = Look(scene.photo.carried, scene.photo.strength, scene.photo.matching)
+    for frame, picture in enumerate(composed(target, more, kept["motion"], look, scene.seed), start=1):
         if frame in frames:
             yield frame, tonemap.from_srgb(np.clip(picture, 0, 1))[::-1].astype(np.float32)
         if frame == frames[-1]:
             break
 
 
+def _display(inputs: Inputs, frame: int) -> np.ndarray:
+    """The fluid of a frame, display values, lowest row first: (Y, X, 3) float32."""
+    from render import tonemap
+
+    return np.ascontiguousarray(tonemap.to_srgb(inputs.read("fluid", frame))[::-1], np.float32)
+
+
 def make_mattes(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The matte of each frame (h, w, 3), which moves with scene.photo.dynamics."""
     from synth.photo.animate import mattes
 
-    target, moves = read_target(scene), inputs.read("assignment")["motion"]
-    found = mattes(target, moves, scene.photo.dynamics, scene.frames)
+    target = read_target(scene)
+    fluid = np.stack([np.rint(255 * np.clip(_display(inputs, frame).mean(axis=2), 0, 1)).astype(np.uint8)
+                      for frame in range(1, scene.frames + 1)])
+    found = mattes(target, fluid, scene.photo.dynamics)
     for frame in frames:
         yield frame, np.repeat(found[frame - 1][::-1, :, None], 3, axis=2)
+
+
+def make_frames(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """The frames, a loop: the fluid over the background."""
+    from render import tonemap
+    from synth.photo.animate import over_background
+
+    target = read_target(scene)
+    for frame in frames:
+        matte = np.ascontiguousarray(inputs.read("mattes", frame)[::-1, :, 0])
+        picture = over_background(target, _display(inputs, frame), matte)
+        yield frame, tonemap.from_srgb(np.clip(picture, 0, 1))[::-1].astype(np.float32)
 
 
 def make_target_picture(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
@@ -112,13 +126,13 @@ def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
         Artifact("assignment", "synth", arrays.ARRAYS, ("photo", "assignment"),
                  (("codebook", "once"), *((name, "once") for name in index)), make_assignment, {"index": index},
                  animated=False, check=check_target),
-        Artifact("frames", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
-                 (("assignment", "once"), *((name, "once") for name in clips)), make_frames, {"clips": clips}),
-        Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (("assignment", "once"),), make_mattes,
-                 export="matte" not in scene.figure.panels)]
+        Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
+                 (("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
+        Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (("fluid", "every"),), make_mattes),
+        Artifact("frames", "synth", images.LIGHT, ("photo",), (("fluid", "same"), ("mattes", "same")), make_frames)]
     if "target" in scene.figure.panels:
         made.append(Artifact("target", "render", images.LIGHT, ("photo",), (), make_target_picture, animated=False))
     if "motion" in scene.figure.panels:
-        made.append(Artifact("motion", "render", images.LIGHT, ("figure.panel",), (("assignment", "once"),), make_motion_picture,
-                             animated=False))
+        made.append(Artifact("motion", "render", images.LIGHT, ("figure.panel",), (("assignment", "once"),),
+                             make_motion_picture, animated=False))
     return tuple(made)

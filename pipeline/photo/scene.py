@@ -21,14 +21,14 @@ class Scene(PhotoScene):
 
 def photo_fits(scene: Scene) -> Faults:
     """Check: a database that has clips, pieces that fit into them, moments there are."""
-    if not scene.clips.recipes() and not scene.clips.files:
-        yield "clips.count", "there is no clip: of these families none is made, and clips.files is empty"
-    if scene.clips.count and scene.assignment.piece >= min(scene.clips.size) // 2:
-        yield "assignment.piece", (f"pieces of {scene.assignment.piece} pixels do not fit into clips of "
-                                   f"{scene.clips.size[0]} x {scene.clips.size[1]} at half their size")
     unknown = [family for family in scene.clips.families if family not in _families()]
     if unknown:
         yield "clips.families", f"there is no family {unknown[0]!r}, only {', '.join(_families())}"
+    elif not scene.clips.recipes() and not scene.clips.files:
+        yield "clips.count", "is 0, and clips.files is empty: there is no clip"
+    if scene.clips.count and scene.assignment.piece >= min(scene.clips.size) // 2:
+        yield "assignment.piece", (f"pieces of {scene.assignment.piece} pixels do not fit into clips of "
+                                   f"{scene.clips.size[0]} x {scene.clips.size[1]} at half their size")
     for number, moment in enumerate(scene.figure.moments):
         if moment > scene.frames:
             yield f"figure.moments[{number}]", f"the animation has {scene.frames} frames"

@@ -21,13 +21,13 @@ class Photo(Table):
 
     file: Asset = key("the picture: JPEG, PNG, TIFF")
     matte: Asset = key("a grey picture of the same size: white where the fluid is (§3)")
-    frozen: Asset | None = key("a grey picture of the same size: white where something stands still in the fluid, as "
-                               "stones and ledges do; none: nothing", None)
+    frozen: Asset | None = key("a grey picture of the same size: white where something stands still in the fluid, "
+                               "as stones and ledges do; none: nothing", None)
     background: Asset | None = key("a picture of the same size that is seen where a dynamic matte leaves (§6); none: "
                                    "inpainted", None)
     strokes: Annotated[tuple[Stroke, ...], Strict(False)] = key(
-        "strokes along the flow, from their first point to their last, each an array of points [x, y] of the file, from "
-        "its upper left corner (§5, figure 8); none: the clips alone decide", (), max_length=1000)
+        "strokes along the flow, from their first point to their last, each an array of points [x, y] of the file, "
+        "from its upper left corner (§5, figure 8); none: the clips alone decide", (), max_length=1000)
     speed: Asset | None = key("a grey picture of the same size, the speed map (§5, figure 8): black rests, white is "
                               "photo.fastest; none: the clips alone decide", None)
     fastest: float = key("speed where the speed map is white", 4.0, "pixels of the output per frame", gt=0, le=100)
@@ -36,8 +36,8 @@ class Photo(Table):
                            "average, to which differences are added", 0.85)
     strength: float = key("strength of the differences", 1.0, ge=0, le=4)
     matching: Literal["gains", "histograms", "none"] = key(
-        "how differences get the look of the picture (§6): \"gains\" by the strength of their bands, over all time, for "
-        "fire and smoke above all; \"histograms\" frame by frame, for water", "gains")
+        "how differences get the look of the picture (§6): \"gains\" by the strength of their bands, over all time, "
+        "for fire and smoke above all; \"histograms\" frame by frame, for water", "gains")
     dynamics: Annotated[float, Field(ge=0, lt=1)] = key(
         "τ of the dynamic boundary of fire and smoke (§6); 0: the matte stands still", 0.0)
 
@@ -54,7 +54,8 @@ class Assignment(Table):
     texture: float = key("weight of the difference of textureness in Eq. 5", 0.35, ge=0, le=100)
     brightness: float = key("weight of the difference of brightness in Eq. 5", 0.5, ge=0, le=100)
     minimizer: Literal["messages", "expansion", "modes", "data"] = key(
-        "\"messages\": TRW-S; \"expansion\": the paper's α-expansion; \"modes\": ICM; \"data\": no neighbours", "messages")
+        "\"messages\": TRW-S; \"expansion\": the paper's α-expansion; \"modes\": ICM; \"data\": no neighbours",
+        "messages")
 
     def settings(self) -> Any:
         """As synth.photo.assign takes them."""

@@ -1,4 +1,4 @@
-"""The target (okabe11 §3): the photograph, its matte, what stands still in it, and what the user wants of the motion."""
+"""The target (okabe11 §3): the photograph, its matte, what stands still in it, what the user wants of the motion."""
 
 from __future__ import annotations
 
@@ -42,12 +42,22 @@ def read_target(scene: PhotoScene) -> Any:
         ..., None])[..., 0] >= FULL
     if frozen is not None and not ((_scaled(scene, matte[..., None])[..., 0] >= FULL) & ~frozen).any():
         raise BadInput(scene.photo.frozen or "", "photo.frozen", "covers all of the matte")
-    background = None if photo.background is None else _scaled(scene, _of_size(
-        pictures.read_foreign(photo.background, "photo.background"), photo.background, "photo.background", shape))
+    background = _background(scene, shape, small, _scaled(scene, matte[..., None])[..., 0])
     speed = None if photo.speed is None else np.float32(photo.fastest) * _scaled(
         scene, _mask(scene, photo.speed, "photo.speed", shape)[..., None])[..., 0]
     wanted = Wanted(_orientation(scene, shape, frozen), speed)
     return Target(small, _scaled(scene, matte[..., None])[..., 0], background, frozen, wanted)
+
+
+def _background(scene: PhotoScene, shape: tuple[int, int], picture: np.ndarray, matte: np.ndarray) -> np.ndarray | None:
+    """What is behind the fluid at the scene's size: the user's, or made up where a dynamic matte will show it."""
+    from synth.photo.boundary import inpainted
+
+    file = scene.photo.background
+    if file is not None:
+        at = "photo.background"
+        return _scaled(scene, _of_size(pictures.read_foreign(file, at), file, at, shape))
+    return inpainted(picture, matte) if scene.photo.dynamics > 0 else None
 
 
 def _of_size(picture: np.ndarray, file: Path, at: str, shape: tuple[int, int]) -> np.ndarray:

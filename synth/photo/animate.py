@@ -18,6 +18,7 @@ from synth.photo.appearance import added, average, extended, gains, matched
 from synth.photo.assign import Nodes, Shown, Wanted
 from synth.photo.boundary import dynamic_matte
 from synth.photo.integrate import Differences, motion_field
+from synth.photo.motion import optical_flow
 from synth.photo.photograph import carried
 from synth.photo.pieces import Cut
 
@@ -37,13 +38,11 @@ class Look:
     strength  of the differences
     matching  "gains": by the strength of bands, over all time, for fire and smoke; "histograms": frame by frame and
               region by region as in the paper, for water; "none"
-    dynamics  τ of the dynamic matte; 0: it stands still
     """
 
     carried: float = 0.85
     strength: float = 1.0
     matching: Literal["gains", "histograms", "none"] = "gains"
-    dynamics: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.carried <= 1 or self.strength < 0:
@@ -82,7 +81,7 @@ class Target:
 def motion(target: Target, of: Nodes, shown: Shown, cut: Cut) -> np.ndarray:
     """The motion (Y, X, 2) float32, pixels per frame: the pieces', turned towards what the user wants, at the wanted
     speed; zero outside the fluid."""
-    found = motion_field(of, shown, target.matte.shape, cut)  # type: ignore[arg-type]
+    found = motion_field(of, shown, target.matte.shape, cut)
     speed = np.hypot(found[..., 0], found[..., 1]) if target.wanted.speed is None else target.wanted.speed
     turned = found
     if target.wanted.orientation is not None:
@@ -92,15 +91,13 @@ def motion(target: Target, of: Nodes, shown: Shown, cut: Cut) -> np.ndarray:
     return np.where(target.fluid[..., None] > 0, scaled, 0).astype(np.float32)
 
 
-def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, seed: int,
-             ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Frame by frame the picture (Y, X, 3) float32 and the matte (Y, X) float32: §6, "Recovery of Color Appearance" on.
+def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, seed: int) -> Iterator[np.ndarray]:
+    """The fluid of each frame (Y, X, 3) float32, everywhere: §6, "Recovery of Color Appearance", "Appearance Matching".
 
     moves  the motion (Y, X, 2) as `motion` gives it
 
     1. The ground: the average, and the photograph carried.
     2. The differences, matched to the target.
-    3. Both together, over the background by the matte.
     """
     length = more.bands.shape[1]
     fluid = extended(target.picture, target.matte)
@@ -112,21 +109,29 @@ def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, s
     # 2. differences
     scale = (np.full_like(more.bands[:, 0], 1 / 255) if look.matching == "none"
              else gains(grey, more.bands, target.fluid))
-    covers = mattes(target, moves, look.dynamics, length)
     for frame in range(length):
         ground = still if moving is None else (1 - look.carried) * still + look.carried * moving[frame]
         shown = added(ground, (scale * more.bands[:, frame]).sum(axis=0) * strength)
         if look.matching == "histograms":
             wanted = matched(shown.mean(axis=2), grey, target.fluid, REGION)
             shown = added(shown, wanted - shown.mean(axis=2))
-        # 3. together
-        matte = covers[frame] if target.frozen is None else np.where(target.frozen, np.float32(0), covers[frame])
-        behind = target.picture if target.background is None else target.background
-        yield (matte[..., None] * shown + (1 - matte[..., None]) * behind).astype(np.float32), matte
+        yield shown
 
 
-def mattes(target: Target, moves: np.ndarray, dynamics: float, length: int) -> np.ndarray:
-    """The matte of each frame: (length, Y, X) float32, moved with `dynamics` (τ of §6); 0: it stands still."""
+def mattes(target: Target, fluid: np.ndarray, dynamics: float) -> np.ndarray:
+    """The matte of each frame: (T, Y, X) float32, moved with `dynamics` (τ of §6); 0: it stands still.
+
+    fluid  (T, Y, X) uint8, grey: the frames of `composed`, whose optical flow is "the motion field M_i of the
+           synthesized animation"
+    """
     if dynamics == 0:
-        return np.broadcast_to(target.matte, (length, *target.matte.shape))
-    return dynamic_matte(target.matte, np.broadcast_to(moves, (length, *moves.shape)), dynamics)
+        return np.broadcast_to(target.matte, fluid.shape)
+    return dynamic_matte(target.matte, optical_flow(fluid), dynamics)
+
+
+def over_background(target: Target, shown: np.ndarray, matte: np.ndarray) -> np.ndarray:
+    """A frame (Y, X, 3) of the fluid over what is behind it, by a matte (Y, X): float32. What is frozen is the
+    picture's."""
+    cover = matte if target.frozen is None else np.where(target.frozen, np.float32(0), matte)
+    behind = target.picture if target.background is None else target.background
+    return (cover[..., None] * shown + (1 - cover[..., None]) * behind).astype(np.float32)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+NEAR = 5
+"""Pixels round a hidden one from which the background is made up."""
 ROUNDS = 30
 """Halvings that find the shift which keeps the area."""
 
@@ -60,3 +62,19 @@ def _with_area(values: np.ndarray, area: float) -> np.ndarray:
         else:
             high = shift
     return np.clip(np.where(soft, values + np.float32((low + high) / 2), values), 0, 1).astype(np.float32)
+
+
+def inpainted(picture: np.ndarray, matte: np.ndarray) -> np.ndarray:
+    """A background for a picture (Y, X, 3) float32 in 0..1: what the matte (Y, X) hides is made up from its borders.
+
+    By the method of Telea 2004. Where the matte covers all there is nothing to go by, and the picture is returned. The
+    paper's was painted by hand, "less than 10 min".
+    """
+    import cv2
+
+    hidden = matte > 0.02
+    if hidden.all() or not hidden.any():
+        return picture
+    bytes_ = np.ascontiguousarray(np.rint(255 * np.clip(picture, 0, 1)), np.uint8)
+    found = cv2.inpaint(bytes_, hidden.astype(np.uint8), NEAR, cv2.INPAINT_TELEA)
+    return np.where(hidden[..., None], found.astype(np.float32) / 255, picture)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from synth.photo.boundary import dynamic_matte
+from synth.photo.boundary import dynamic_matte, inpainted
 
 SHAPE, FRAMES = (60, 80), 12
 
@@ -56,3 +56,13 @@ def test_an_empty_and_a_full_matte_stay_so(matte):
 def test_dynamics_outside_their_range_are_refused(dynamics):
     with pytest.raises(ValueError, match=r"\[0, 1\)"):
         dynamic_matte(flame(), licking(), dynamics)
+
+
+def test_a_background_goes_on_behind_what_hides_it():
+    y, x = np.mgrid[:SHAPE[0], :SHAPE[1]]
+    wall = np.stack([0.2 + 0.005 * x, 0.3 + 0 * x, 0.5 + 0 * x], axis=-1).astype(np.float32)
+    hidden = np.float32(np.hypot(x - 40, y - 30) < 9)
+    seen = np.where(hidden[..., None] > 0, np.float32(1), wall)
+    np.testing.assert_allclose(inpainted(seen, hidden), wall, atol=0.03)
+    np.testing.assert_array_equal(inpainted(seen, hidden)[hidden == 0], wall[hidden == 0])
+    np.testing.assert_array_equal(inpainted(seen, np.ones(SHAPE)), seen)
