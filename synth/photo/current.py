@@ -1,7 +1,7 @@
 """A current past stones that repeats after T frames: a steady flow and eddies that it carries.
 
-The steady one is a uniform flow, projected. The eddies are the curl of a potential [Bridson et al. 2007], a tile of noise
-that drifts with the flow and changes on its way; it drifts by whole tiles in T frames.
+The steady one is a uniform flow, projected. The eddies are the curl of a potential [Bridson et al. 2007], a tile of
+noise that drifts with the flow and changes on its way; it drifts by whole tiles in T frames.
 """
 
 from __future__ import annotations
@@ -58,7 +58,11 @@ def past_stones(U: np.ndarray, distance: np.ndarray) -> np.ndarray:
 
 def eddies(shape: tuple[int, int], frames: int, U: np.ndarray, size: float, speed: float, strength: np.ndarray,
            random: np.random.Generator) -> np.ndarray:
-    """Potentials (T, Y + 2, X + 2) float32 of eddies about `size` pixels wide of rms speed `speed` times strength (Y, X)."""
+    """Potentials (T, Y + 2, X + 2) float32 of eddies that drift with U and change.
+
+    size      of the eddies, about, pixels
+    speed     rms, pixels per frame, where strength (Y, X) is 1
+    """
     travelled = np.abs(U) * frames
     # a tile of about 256 pixels along each axis, passed a whole number of times
     turns = np.maximum(np.rint(travelled / 256), (travelled > 64) * 1.0)
