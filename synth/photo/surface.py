@@ -183,14 +183,14 @@ def _breaking(bed: np.ndarray, distance: np.ndarray, U: np.ndarray, white: float
 def _foam(current: Current, breaking: np.ndarray, frames: int, random: np.random.Generator,
           scale: float) -> np.ndarray:
     """Density of foam in each frame, (T, Y, X): born where waves break, carried, fading; on every second pixel."""
-    life = min(30.0, frames / 5)  # after T frames nothing is left of what was before the first
+    life = min(30.0, frames / 5)  # of what was two loops ago less than a ten thousandth is left
     coarse = breaking[::2, ::2]
     grid = Grid(coarse.shape, "clamp")
     gusts = [noise(coarse.shape, random, 24 * scale, falloff=1.2) for _ in range(4)]
     turn = 2 * np.pi / frames
     density = opencl.to_device(coarse * 0.5)
     out = np.empty((frames, *breaking.shape), np.float32)
-    for t in range(-frames, frames):
+    for t in range(-2 * frames, frames):
         v = current.velocity(t % frames)[::2, ::2] / 2
         moved = grid.gather(density, grid.departure(opencl.to_device(v))).get()
         a, b = turn * t * round(frames / 32), turn * t * round(frames / 14)
