@@ -13,7 +13,7 @@ from scipy import ndimage
 from synth import opencl
 from synth.photo import rock
 from synth.photo.carried import sampled
-from synth.photo.clip import Clip, eight_bit
+from synth.photo.clip import Clip, eight_bit, film
 from synth.photo.sea import sea
 from synth.photo.surface import lit_along, reflected
 from synth.photo.tiles import noise, rng, smooth_step
@@ -75,7 +75,7 @@ def shallow(seed: int, frames: int, size: tuple[int, int], *, direction: float =
         focus = ndimage.gaussian_filter(np.gradient(sx, axis=1) + np.gradient(sy, axis=0), 1.2 * scale)
         light = 1 / np.clip(1 + 0.9 * deep * focus, 0.35, 3)
         mirrored = reflected(sx, sy, 0.10, lit_along(direction))
-        luma[t] = eight_bit(1.1 * seen * (0.55 + 0.45 * light) + 0.35 * (mirrored - 0.1))
+        luma[t] = eight_bit(film(1.1 * seen * (0.55 + 0.45 * light) + 0.35 * (mirrored - 0.1)))
     return Clip(luma, np.broadcast_to(sea_.travel, (*shape, 2)).astype(np.float32), np.ones(shape, np.float32))
 
 
@@ -104,7 +104,7 @@ def bay(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0.8
         foam = 0.7 * np.exp(-np.abs(reach) / (1.6 * scale)) * smooth_step(-0.5, 1.0, wash / (3 * scale))
         dry = smooth_step(0.8, -0.8, reach)
         grey = water + (0.9 - water) * foam
-        luma[t] = eight_bit(grey + (standing.grey - grey) * dry)
+        luma[t] = eight_bit(film(grey + (standing.grey - grey) * dry))
         wet += 1 - dry
     coverage = wet / frames
     return Clip(luma, (sea_.travel * (coverage > 0.5)[..., None]).astype(np.float32), coverage)
