@@ -75,7 +75,7 @@ def shallow(seed: int, frames: int, size: tuple[int, int], *, direction: float =
         focus = ndimage.gaussian_filter(np.gradient(sx, axis=1) + np.gradient(sy, axis=0), 1.2 * scale)
         light = 1 / np.clip(1 + 0.9 * deep * focus, 0.35, 3)
         mirrored = reflected(sx, sy, 0.10, lit_along(direction))
-        luma[t] = eight_bit(film(1.1 * seen * (0.55 + 0.45 * light) + 0.35 * (mirrored - 0.1)))
+        luma[t] = eight_bit(film(1.1 * seen * (0.55 + 0.45 * light) + 0.35 * (mirrored - 0.02)))
     return Clip(luma, np.broadcast_to(sea_.travel, (*shape, 2)).astype(np.float32), np.ones(shape, np.float32))
 
 
