@@ -13,7 +13,7 @@ from scipy import ndimage
 from synth import opencl
 from synth.photo import rock
 from synth.photo.carried import sampled
-from synth.photo.clip import Clip, eight_bit
+from synth.photo.clip import Clip, eight_bit, film
 from synth.photo.sea import sea
 from synth.photo.surface import lit_along, reflected
 from synth.photo.tiles import noise, rng, smooth_step
@@ -75,7 +75,7 @@ def shallow(seed: int, frames: int, size: tuple[int, int], *, direction: float =
         focus = ndimage.gaussian_filter(np.gradient(sx, axis=1) + np.gradient(sy, axis=0), 1.2 * scale)
         light = 1 / np.clip(1 + 0.9 * deep * focus, 0.35, 3)
         mirrored = reflected(sx, sy, 0.10, lit_along(direction))
-        luma[t] = eight_bit(1.1 * seen * (0.55 + 0.45 * light) + 0.35 * (mirrored - 0.1))
+        luma[t] = eight_bit(film(1.1 * seen * (0.55 + 0.45 * light) + 0.35 * (mirrored - 0.02)))
     return Clip(luma, np.broadcast_to(sea_.travel, (*shape, 2)).astype(np.float32), np.ones(shape, np.float32))
 
 
@@ -104,7 +104,7 @@ def bay(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0.8
         foam = 0.7 * np.exp(-np.abs(reach) / (1.6 * scale)) * smooth_step(-0.5, 1.0, wash / (3 * scale))
         dry = smooth_step(0.8, -0.8, reach)
         grey = water + (0.9 - water) * foam
-        luma[t] = eight_bit(grey + (standing.grey - grey) * dry)
+        luma[t] = eight_bit(film(grey + (standing.grey - grey) * dry))
         wet += 1 - dry
     coverage = wet / frames
     return Clip(luma, (sea_.travel * (coverage > 0.5)[..., None]).astype(np.float32), coverage)
@@ -115,29 +115,37 @@ def lake(seed: int, frames: int, size: tuple[int, int], *, direction: float = -1
     """A lake seen from its shore, which mirrors trees and the sky above them."""
     shape = size[1], size[0]
     scale = shape[0] / 240
-    y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
-    below = HORIZON * shape[0] - y
-    away = shape[0] * 40 * scale / below
-    # a pixel is a pixel of the plane at a third of the picture's height
-    places = np.stack([(x - shape[1] / 2) * away / (60 * scale), away * 2.2], -1)
+    # two samples in each pixel, one over the other: the mirror image is drawn apart along y
+    y, x = np.mgrid[: 2 * shape[0], : shape[1]].astype(np.float32)
+    y = (y - 0.5) / 2
+    places = _plane(x - shape[1] / 2, HORIZON * shape[0] - y, scale)
     sea_ = waves(places, frames, seed + 1, direction=direction, length=length * scale, gravity=0.2 * scale,
                  slope=slope, spread=2.0)
-    stretch = np.abs(np.gradient(places[..., 1], axis=0))
+    stretch = 2 * np.abs(np.gradient(places[..., 1], axis=0))
     calmed = np.minimum(1, 2.5 / stretch)  # waves finer than the pixels that see them cancel
-    shore = _shore(shape, rng(seed, 34))
+    shore = ndimage.gaussian_filter(_shore(shape, rng(seed, 34)), 0.7, mode="wrap")
     row, column = 2.2 * shape[0], 0.5 * shape[1]
     luma = np.empty((frames, *shape), np.uint8)
     for t in range(frames):
         sx, sy = sea_.slopes[:, t] * calmed
         # a facet that leans towards the viewer mirrors what stands higher
         up = np.clip((HORIZON - 0.02) * shape[0] - y + row * sy, 0, len(shore) - 1.01)
-        across = x + column * sx
-        seen = ndimage.map_coordinates(shore, [up, across], order=1, mode="grid-wrap")
-        glance = np.clip(0.75 + 0.25 * y / shape[0] - 2.0 * sy, 0.4, 1)
-        luma[t] = eight_bit(0.05 + seen * glance)
-    jacobian = np.stack([np.stack(np.gradient(places[..., k])[::-1], -1) for k in range(2)], -2)
+        seen = ndimage.map_coordinates(shore, [up, x + column * sx], order=1, mode="grid-wrap")
+        grey = 0.05 + seen * np.clip(0.75 + 0.25 * y / shape[0] - 2.0 * sy, 0.4, 1)
+        luma[t] = eight_bit(0.5 * (grey[::2] + grey[1::2]))
+    by_row, by_column = (np.gradient(places, axis=axis) for axis in (0, 1))
+    jacobian = np.stack([by_column, 2 * by_row], -1)[::2]  # of the plane by the picture
     velocity = np.linalg.solve(jacobian, np.broadcast_to(sea_.travel, (*shape, 2))[..., None])[..., 0]
     return Clip(luma, velocity.astype(np.float32), np.ones(shape, np.float32))
+
+
+def _plane(x: np.ndarray, below: np.ndarray, scale: float) -> np.ndarray:
+    """Where on a lake the viewer looks, (Y, X, 2: across, away), pixels of the plane.
+
+    x, below  pixels from the middle of the picture, and under the horizon; 160 scales under it a pixel of the plane is
+              as wide as one of the picture
+    """
+    return np.stack([x * 160 * scale / below, 21120 * scale**2 / below], -1)
 
 
 def _shore(shape: tuple[int, int], random: np.random.Generator) -> np.ndarray:

@@ -4,6 +4,9 @@ Each pixel follows the flow back to where its content was when the carrying bega
 frames, in three phases a third of a period apart, each fading in and out [Max and Becker 1995; Neyret 2003]. Each
 beginning has its place in the tile, given by phase and number modulo T, so frame T is frame 0. The weights are such
 that noise of deviation 1 keeps it.
+
+Hot: `sampled` is half of a river (3.3 of 6.4 s of two CPU cores for 96 frames of 320×240) and two fifths of a fall, a
+bay or a cloud. It is bound by scattered reads: a pixel reads 4 texels for each phase.
 """
 
 from __future__ import annotations

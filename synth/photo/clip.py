@@ -23,6 +23,15 @@ class Clip:
     chroma: np.ndarray | None = None
 
 
+KNEE = 0.75
+
+
+def film(grey: np.ndarray) -> np.ndarray:
+    """Display values that approach white above KNEE and never reach it, as on film: glints keep their shape."""
+    above = np.maximum(grey - KNEE, 0) / (1 - KNEE)
+    return np.minimum(grey, KNEE) + (1 - KNEE) * above / (1 + above)
+
+
 def eight_bit(grey: np.ndarray) -> np.ndarray:
     """Display values in [0, 1] as uint8, rounded."""
     return np.clip(np.rint(grey * 255), 0, 255).astype(np.uint8)

@@ -58,7 +58,10 @@ def past_stones(U: np.ndarray, distance: np.ndarray) -> np.ndarray:
 
 def eddies(shape: tuple[int, int], frames: int, U: np.ndarray, size: float, speed: float, strength: np.ndarray,
            random: np.random.Generator) -> np.ndarray:
-    """Potentials (T, Y + 2, X + 2) float32 of eddies about `size` pixels wide, rms speed `speed` times strength (Y, X).
+    """Potentials (T, Y + 2, X + 2) float32 of eddies that drift with U and change.
+
+    size      of the eddies, about, pixels
+    speed     rms, pixels per frame, where strength (Y, X) is 1
     """
     travelled = np.abs(U) * frames
     # a tile of about 256 pixels along each axis, passed a whole number of times

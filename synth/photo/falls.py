@@ -89,7 +89,7 @@ def bed(shape: tuple[int, int], random: np.random.Generator, ledges: int, lip: f
 
 
 def fall(seed: int, frames: int, size: tuple[int, int], *, width: float = 0.8, speed: float = 5.0, ledges: int = 2,
-         density: float = 0.5, lean: float = 0.0, lip: float = 1.05, foot: float = 0.12, spray: float = 1.0,
+         density: float = 0.5, lean: float = 0.0, lip: float = 1.05, foot: float = 0.12,
          tone: float = 0.22) -> Clip:
     """A fall.
 
@@ -99,7 +99,6 @@ def fall(seed: int, frames: int, size: tuple[int, int], *, width: float = 0.8, s
     density  of the water: 0.2 threads on dark rock, 0.8 a white curtain
     lean     pixels to the right for each pixel down
     lip, foot  heights of the first edge and of the pool, shares of the picture's height
-    spray    amount of droplets that fly off
     tone     mean grey of the rock
     """
     shape = size[1], size[0]
@@ -117,23 +116,24 @@ def fall(seed: int, frames: int, size: tuple[int, int], *, width: float = 0.8, s
 
     alpha, light = _sheets(ground, motion, tau, cover + 1.6 * (density - 0.5), seed, frames)
     front = _emission((frames * PER_FRAME, COLUMNS), rng(seed, 2, 1), scale)  # of the sheet in front
-    shot = drops.streaks(_droplets(ground, motion, front, envelope, rng(seed, 4), frames, density, spray, lean),
-                         frames, shape, SHUTTER)
-    thrown = drops.streaks(_splashes(ground, motion, envelope, rng(seed, 5), frames, spray * density, lean),
+    flying = _droplets(ground, motion, front, _starts(ground, rng(seed, 3, 1), len(front)), envelope, rng(seed, 4),
+                       frames, density, lean)
+    shot = drops.streaks(flying, frames, shape, SHUTTER)
+    thrown = drops.streaks(_splashes(ground, motion, envelope, rng(seed, 5), frames, density, lean),
                            frames, shape, SHUTTER)
     back = _ground(ground, envelope, rng(seed, 6), tone, frames)
-    mist = _mist(ground, motion, envelope, rng(seed, 7), frames, shape, spray * density, lean)
+    mist = _mist(ground, motion, envelope, rng(seed, 7), frames, shape, density, lean)
     luma = np.empty((frames, *shape), np.uint8)
     coverage = np.zeros(shape, np.float32)
     for t in range(frames):
         grain = 1 - np.exp(-0.9 * shot[t])
-        flying = 1 - np.exp(-ndimage.gaussian_filter(thrown[t], 0.5))
+        spray = 1 - np.exp(-ndimage.gaussian_filter(thrown[t], 0.5))
         grey = back[t] * (1 - alpha[t]) + light[t]
         grey += (0.93 - grey) * np.minimum(grain, 0.95)
         grey += (0.88 - grey) * mist[t]
-        grey += (0.95 - grey) * flying
+        grey += (0.95 - grey) * spray
         luma[t] = eight_bit(grey)
-        coverage += 1 - (1 - alpha[t]) * (1 - grain) * (1 - flying)
+        coverage += 1 - (1 - alpha[t]) * (1 - grain) * (1 - spray)
     coverage = np.where(np.arange(shape[0])[:, None] < ground.foot, 1, coverage / frames).astype(np.float32)
     return Clip(luma, _velocity(ground, motion.speed(tau), coverage, frames), coverage)
 
@@ -153,7 +153,7 @@ def _sheets(ground: Bed, motion: Motion, tau: np.ndarray, cover: np.ndarray, see
     phases[:, 0, 2] = 1
     for layer, (most, grey) in enumerate(((0.75, 0.66), (0.9, 0.76))):
         tile = _emission((frames * PER_FRAME, COLUMNS), rng(seed, 2, layer), shape[0] / 240)
-        places = opencl.to_device(_places(ground, tau, rng(seed, 3, layer), len(tile)))
+        places = opencl.to_device(_places(ground, tau, _starts(ground, rng(seed, 3, layer), len(tile))))
         water, shade = (sampled(opencl.to_device(one[None]), places, phases, np.zeros(frames))
                         for one in (tile, _side_lit(tile)))
         sheet = most * smooth_step(-0.35, 1.3, 0.75 * water + thinned.astype(np.float32))
@@ -209,10 +209,14 @@ def _side_lit(tile: np.ndarray) -> np.ndarray:
     return np.tanh(slope / slope.std() * 0.7).astype(np.float32)
 
 
-def _places(ground: Bed, tau: np.ndarray, random: np.random.Generator, rows: int) -> np.ndarray:
-    """From each pixel to its place in a tile of emission, (Y, X, 2) float32: every section has its own part."""
+def _starts(ground: Bed, random: np.random.Generator, rows: int) -> np.ndarray:
+    """Where in a tile of emission each section begins, (K + 1, 2: place, row of time): each has its own part."""
+    return np.asarray(random.integers(0, (COLUMNS, rows), (len(ground.tops), 2)))
+
+
+def _places(ground: Bed, tau: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """From each pixel to its place in a tile of emission in frame 0, (Y, X, 2) float32."""
     y, x = np.mgrid[: tau.shape[0], : tau.shape[1]]
-    starts = random.random((len(ground.tops), 2)) * (COLUMNS, rows)
     start = starts[ground.section]
     return np.stack([ground.s + start[..., 0] - x, start[..., 1] - tau * PER_FRAME - y], -1).astype(np.float32)
 
@@ -225,17 +229,17 @@ def _ends(ground: Bed, k: int, place: np.ndarray) -> np.ndarray:
     return end
 
 
-def _droplets(ground: Bed, motion: Motion, tile: np.ndarray, envelope: np.ndarray, random: np.random.Generator,
-              frames: int, density: float, spray: float, lean: float) -> drops.Drops:
-    """Droplets in the falling water, thick where it is thick."""
+def _droplets(ground: Bed, motion: Motion, tile: np.ndarray, starts: np.ndarray, envelope: np.ndarray,
+              random: np.random.Generator, frames: int, density: float, lean: float) -> drops.Drops:
+    """Droplets in the falling water, thick where the sheet of this tile is thick."""
     height, width = ground.s.shape
     groups = []
     times, distances = motion.table(1.5 * height)
     for k, (top, wet) in enumerate(zip(ground.tops, ground.wets, strict=True)):
-        count = round(0.9 * width * frames * (0.4 + density) * spray)
+        count = round(0.9 * width * frames * (0.4 + density))
         place = random.integers(0, width, count)
         birth = random.uniform(0, frames, count)
-        e = tile[(birth * PER_FRAME).astype(int) % len(tile), place % tile.shape[1]]
+        e = tile[(birth * PER_FRAME + starts[k, 1]).astype(int) % len(tile), (place + starts[k, 0]) % COLUMNS]
         kept = wet[place] & (random.random(count) < smooth_step(-1.2, 1.5, envelope[place] + 0.8 * e + density - 0.5))
         place, birth = place[kept], birth[kept]
         deep = top[place] - _ends(ground, k, place)
@@ -301,7 +305,7 @@ def _ground(ground: Bed, envelope: np.ndarray, random: np.random.Generator, tone
     if ground.foot <= 1:
         return np.broadcast_to(still, (frames, *shape))
     y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
-    shore = ground.foot + 2.5 * scale * noise((4, shape[1]), random, (30 * scale, 4), falloff=0.6, finest=1)[0]
+    shore = ground.foot + 2.5 * scale * noise((4, shape[1]), random, (30 * scale, 4), falloff=0.6, finest=4)[0]
     near = _near(ground, y)
     tile = lace(COLUMNS, random, 22 * scale)
     places = np.stack([0.5 * shape[1] + (x - 0.5 * shape[1]) / near - x, -FLAT * scale * np.log(near) / NEARER - y], -1)

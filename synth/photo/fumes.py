@@ -165,7 +165,8 @@ def _logs(shape: tuple[int, int], random: np.random.Generator, width: float,
         cy = source * random.uniform(0.5, 1.1)
         along = (x - cx) * np.cos(turn) + (y - cy) * np.sin(turn)
         across = ((y - cy) * np.cos(turn) - (x - cx) * np.sin(turn)) / (0.5 * source * random.uniform(0.6, 1))
-        inside = smooth_step(1.05, 0.9, np.abs(across)) * (np.abs(along) < 0.32 * width * shape[1])
+        end = np.abs(along) / (0.32 * width * shape[1]) + 0.02 * across**2  # sawn, and seen a little from its end
+        inside = smooth_step(1.05, 0.9, np.abs(across)) * smooth_step(1.01, 0.98, end)
         hidden = np.maximum(hidden, inside)
         grey = grey * (1 - inside) + inside * bark * (0.15 + 0.55 * np.clip(0.2 + 0.8 * across, 0, 1))
     return hidden.astype(np.float32), np.clip(grey, 0, 1.2).astype(np.float32)

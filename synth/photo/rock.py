@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, spatial
 
 from synth.photo.tiles import cells, noise, smooth_step
 
@@ -76,8 +76,6 @@ def pebbles(shape: tuple[int, int], random: np.random.Generator, size: float) ->
         box = np.array(shape[::-1], float)
         points = random.random((count, 2)) * box
         greys = random.uniform(0.2, 0.75, count)
-        from scipy import spatial
-
         y, x = np.mgrid[: shape[0], : shape[1]]
         bent = noise(shape, random, 1.2 * size, falloff=1.0)
         where = np.stack([x + 1.2 * bent, y - 1.2 * bent], -1).reshape(-1, 2) % box

@@ -15,13 +15,13 @@ from synth import opencl
 from synth.advect import Grid
 from synth.photo import drops, rock
 from synth.photo.carried import carried
-from synth.photo.clip import Clip, eight_bit
+from synth.photo.clip import Clip, eight_bit, film
 from synth.photo.current import Current, eddies, past_stones
 from synth.photo.sea import sea
 from synth.photo.tiles import enlarged, lace, noise, rng, smooth_step
 
 TILE = 192
-BOTTOM = 0.042  # deviation of grey that the bed shows through the water
+BOTTOM = 0.05  # deviation of grey that the bed shows through the water
 
 
 def lit_along(direction: float) -> float:
@@ -71,11 +71,11 @@ def running(seed: int, frames: int, size: tuple[int, int], *, direction: float, 
         water = reflected(relief_x + moving[0], relief_y + moving[1], tone, lit_along(direction))
         water = np.maximum(water + bottom, 0.02) * (1 - 0.35 * rim)
         foam = smooth_step(0.1, 1.6, (0.8 - 0.5 * density[t]) * walls + 0.3 * lumps + 2.8 * density[t] - 0.8)
-        shade = 0.76 + 0.10 * lumps + 0.05 * walls + 0.5 * np.clip(relief_x * -0.45 + relief_y * 0.6, -0.4, 0.4)
-        grey = water + foam * (np.clip(shade, 0.4, 0.97) - water)
+        shade = 0.73 + 0.12 * lumps + 0.06 * walls + 0.8 * np.clip(relief_x * -0.45 + relief_y * 0.6, -0.4, 0.4)
+        grey = water + foam * (np.clip(shade, 0.35, 1.1) - water)
         grey += (standing.grey - grey) * dry
         grey += (0.95 - grey) * (1 - np.exp(-ndimage.gaussian_filter(splashes[t], 0.5)))
-        luma[t] = eight_bit(grey)
+        luma[t] = eight_bit(film(grey))
     coverage = (1 - dry).astype(np.float32)
     velocity = current.mean() * (coverage > 0.5)[..., None]
     return Clip(luma, velocity, coverage)
@@ -95,7 +95,7 @@ def white_water(seed: int, frames: int, size: tuple[int, int], *, direction: flo
                 stones: int = 1, white: float = 0.6, tone: float = 0.14) -> Clip:
     """Rapids: standing waves that break; parameters as `running`."""
     return running(seed, frames, size, direction=direction, speed=speed, stones=stones, white=white, tone=tone,
-                   relief=0.2, ripples=0.16, eddying=0.12)
+                   relief=0.23, ripples=0.15, eddying=0.12)
 
 
 def river(seed: int, frames: int, size: tuple[int, int], *, direction: float = 0.2, speed: float = 2.2,
@@ -183,14 +183,14 @@ def _breaking(bed: np.ndarray, distance: np.ndarray, U: np.ndarray, white: float
 def _foam(current: Current, breaking: np.ndarray, frames: int, random: np.random.Generator,
           scale: float) -> np.ndarray:
     """Density of foam in each frame, (T, Y, X): born where waves break, carried, fading; on every second pixel."""
-    life = min(30.0, frames / 5)  # after T frames nothing is left of what was before the first
+    life = min(30.0, frames / 5)  # of what was two loops ago less than a ten thousandth is left
     coarse = breaking[::2, ::2]
     grid = Grid(coarse.shape, "clamp")
     gusts = [noise(coarse.shape, random, 24 * scale, falloff=1.2) for _ in range(4)]
     turn = 2 * np.pi / frames
     density = opencl.to_device(coarse * 0.5)
     out = np.empty((frames, *breaking.shape), np.float32)
-    for t in range(-frames, frames):
+    for t in range(-2 * frames, frames):
         v = current.velocity(t % frames)[::2, ::2] / 2
         moved = grid.gather(density, grid.departure(opencl.to_device(v))).get()
         a, b = turn * t * round(frames / 32), turn * t * round(frames / 14)
