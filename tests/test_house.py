@@ -24,7 +24,7 @@ HOMES = {
     "av": {"pipeline/files/video.py"},
     "trimesh": {"pipeline/files/meshes.py"},
     "pymeshlab": {"pipeline/files/mesh_repair.py"},
-    "cv2": {"synth/motion/strokes.py", "synth/photo/checks.py"},  # sketches; optical flow
+    "cv2": {"synth/motion/strokes.py", "synth/photo/"},  # sketches; optical flow
     "svgpathtools": {"synth/motion/strokes.py"},
     "mujoco": {"synth/elements/simulation.py"},
     "pxr": {"pipeline/files/usd.py"},
