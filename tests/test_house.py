@@ -30,7 +30,7 @@ HOMES = {
     "pxr": {"pipeline/files/usd.py"},
     "h5netcdf": {"pipeline/files/netcdf.py"},
     "rlic": {"render/lic.py"},
-    "threadpoolctl": {"synth/motion/neighborhood.py", "synth/elements/assignment.py"},
+    "threadpoolctl": {"synth/motion/neighborhood.py", "synth/elements/assignment.py", "synth/photo/assign.py"},
     "cyclopts": {"pipeline/cli.py"},
     "pydantic": {"pipeline/tables.py", "pipeline/flow.py", *(f"{method}/" for method in METHODS),  # tables,
                  "pipeline/scene.py", "pipeline/schema.py"},  # filling them, writing them down
