@@ -6,7 +6,7 @@ In the order data passes through them:
     tables        what every scene is written in
     flow          the flow that a scene lives in: coarse motion and obstacles
     methods       the methods there are; each is a folder: `motion` (ma09), `elements` (ma13),
-                  `texture` (wang05)
+                  `texture` (wang05), `photo` (okabe11)
     scene         a TOML file, checked, as one scene for each variant
     stages        synth, bake, render and figure, in order
     build         which files a scene needs, which are up to date, making the others; knows no method

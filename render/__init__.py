@@ -22,6 +22,7 @@ In the order data passes through them:
     tonemap         linear light to display values, and these to eight bits
     speed_map       speed as colour over a texture, and its legend
     layout          panels, labels, insets and legends as one figure
+    contact_sheet   clips of fluids on one sheet
 
 Fields and densities have y up, row 0 the lowest; pictures have their top row first. Pictures are linear Rec.709 light,
 which `tonemap` turns into sRGB display values in [0, 1]; `lic` and `arrows` give display values at once.

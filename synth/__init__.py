@@ -15,6 +15,7 @@ In the order data passes through them:
     motion/     motion field texture synthesis (ma09)
     elements/   dynamic element textures (ma13)
     texture/    directional moving texture (wang05)
+    photo/      fluid animation from a single image (okabe11)
     particles   particles carried by a motion field, past obstacles
     seaweed     a bed of seaweed that a motion field bends
 

@@ -1,7 +1,7 @@
 """The one home of pyopencl: device, build, launch. A kernel is written once, for CPU (PoCL) and GPU alike.
 
 What it promises: the same source, defines and inputs give the same bits on one device, at any number of
-threads. So kernels gather and never scatter, use no float atomics, and are built without fast-math.
+threads. So kernels gather, or scatter sums of integers, use no float atomics, and are built without fast-math.
 """
 
 from __future__ import annotations

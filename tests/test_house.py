@@ -24,13 +24,13 @@ HOMES = {
     "av": {"pipeline/files/video.py"},
     "trimesh": {"pipeline/files/meshes.py"},
     "pymeshlab": {"pipeline/files/mesh_repair.py"},
-    "cv2": {"synth/motion/strokes.py"},
+    "cv2": {"synth/motion/strokes.py", "synth/photo/"},  # sketches; optical flow
     "svgpathtools": {"synth/motion/strokes.py"},
     "mujoco": {"synth/elements/simulation.py"},
     "pxr": {"pipeline/files/usd.py"},
     "h5netcdf": {"pipeline/files/netcdf.py"},
     "rlic": {"render/lic.py"},
-    "threadpoolctl": {"synth/motion/neighborhood.py", "synth/elements/assignment.py"},
+    "threadpoolctl": {"synth/motion/neighborhood.py", "synth/elements/assignment.py", "synth/photo/assign.py"},
     "cyclopts": {"pipeline/cli.py"},
     "pydantic": {"pipeline/tables.py", "pipeline/flow.py", *(f"{method}/" for method in METHODS),  # tables,
                  "pipeline/scene.py", "pipeline/schema.py"},  # filling them, writing them down

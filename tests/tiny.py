@@ -179,10 +179,31 @@ spp = 1
 panels = ["sample", "result"]
 panel = 32
 """
+PHOTO = """\
+title = "A stream"
+frames = 8
+[photo]
+file = "assets/stream/image.jpg"
+matte = "assets/stream/mask.png"
+strokes = [[[745, 340], [742, 376]], [[560, 600], [500, 640]]]
+width = 96
+[clips]
+count = 1
+families = ["cloud"]
+size = [64, 64]
+length = 16
+[assignment]
+piece = 16
+candidates = 20
+[figure]
+panels = ["target", "matte", "motion", "result"]
+panel = 32
+"""
 SCENES = {"smoke": SMOKE, "river": RIVER, "volume": VOLUME, "space": SPACE, "potential": POTENTIAL,
           "lagrangian": LAGRANGIAN, "beads": BEADS, "fish": FISH, "noodles": NOODLES, "paper": PAPER,
           "texture": TEXTURE, "texture by the paper": BY_PAPER, "texture of true speed": TINTED,
-          "texture that loops": LOOP, "texture on a surface": TEXTURE_ON_SURFACE}
+          "texture that loops": LOOP, "texture on a surface": TEXTURE_ON_SURFACE,
+          "photo": PHOTO}
 """Scenes that together have every stage, every look and every way to synthesize."""
 
 

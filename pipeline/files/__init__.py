@@ -10,6 +10,7 @@ pictures     8-bit PNG, and what OpenImageIO does with pictures
 meshes       PLY of meshes and points; a user's mesh as voxels
 mesh_repair  closes a mesh that is not watertight (pymeshlab)
 polygons     a user's PLY and OBJ as they stand, and the elements that their vertices make
+arrays       named arrays, our own .npz
 tracks       element tracks: our own .npz; tables, sequences of meshes and curves of a user's
 netcdf       NetCDF 3 and 4: a user's wind or current on latitude and longitude
 usd          OpenUSD: one file of a whole animation of elements

@@ -26,7 +26,6 @@ from __future__ import annotations
 import csv
 import dataclasses
 import re
-import zipfile
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -34,8 +33,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.errors import BadInput, StorageFailed
-from pipeline.files import atomic, polygons, sandbox, usd
+from pipeline.errors import BadInput
+from pipeline.files import arrays, polygons, sandbox, usd
 from pipeline.files.format import Format
 from synth.elements.samples import Elements
 
@@ -44,7 +43,6 @@ LARGEST = 1e9  # of a coordinate
 SECONDS, SECONDS_PER_FILE = 60.0, 0.5  # that a sequence may take: far more than it does
 _FIELDS = "flowloom_tracks"  # the names of the arrays: a damaged directory of a zip loses entries without a word
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
-_LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the same elements give the same bytes
 
 
 def write(path: Path, elements: Elements, **beside: np.ndarray) -> None:
@@ -56,19 +54,8 @@ def write(path: Path, elements: Elements, **beside: np.ndarray) -> None:
     fields = {field.name: getattr(elements, field.name) for field in dataclasses.fields(elements)}
     if fields.keys() & beside.keys():
         raise ValueError(f"a field of Elements cannot lie beside them: {', '.join(fields.keys() & beside.keys())}")
-    arrays = {name: np.asarray(value) for name, value in (fields | beside).items() if value is not None}
-    with atomic.replacing(path) as temporary:
-        with zipfile.ZipFile(temporary, "w") as archive:
-            for name, array in {_FIELDS: np.array(list(arrays)), **arrays}.items():
-                with archive.open(zipfile.ZipInfo(f"{name}.npy", _LONG_AGO), "w", force_zip64=True) as entry:
-                    np.lib.format.write_array(entry, np.asarray(array, order="C"), allow_pickle=False)
-        try:
-            back = _arrays(temporary)
-        except ValueError as error:
-            raise StorageFailed(path, f"did not read back ({error}); is the disk full?") from error
-        for name, array in arrays.items():
-            if not np.array_equal(back[name], array):
-                raise StorageFailed(path, f"'{name}' did not read back as it was written; is the disk full?")
+    arrays.write(path, {name: np.asarray(value) for name, value in (fields | beside).items() if value is not None},
+                 _FIELDS)
 
 
 def read(path: Path) -> Elements:

@@ -1,0 +1,162 @@
+"""[clips]: the database of clips (okabe11 §4) as artifacts.
+
+    clip-001 …   the frames and the mean velocity of a clip, made by synth.photo.clips or read from a user's video
+    codebook     visual words
+    index-001 …  the pieces of a clip as assignment compares them
+
+Each is kept once for all scenes, in out/shared. A run that is interrupted goes on with the clip that it was at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, Strict
+
+from pipeline.build.artifact import Artifact, Inputs
+from pipeline.errors import BadInput
+from pipeline.files import arrays, video
+from pipeline.photo.tables import PhotoScene
+from pipeline.tables import Asset, Table, key
+
+SAMPLED = 7
+"""Every so manieth descriptor of a clip goes into the sample of the codebook."""
+LEAST = 8
+"""Frames of a user's clip, at least."""
+CUT = 4.0
+"""A cut: a frame that differs from the next so many times as much as half of them do."""
+SHAKEN = 0.75
+"""Pixels that a whole frame moves from one to the next, at the median: the camera moves."""
+Even = Annotated[int, Field(ge=64, le=1920, multiple_of=2)]
+Families = tuple[str, ...]
+
+
+class Clips(Table):
+    """The clips whose motion the picture gets: made for it, and a user's own."""
+
+    count: int = key("clips that are made; 0: the user's alone", 150, ge=0, le=150)
+    families: Annotated[Families, Strict(False)] = key(
+        "of which families: fall, white-water, river, bay, shallow, lake, fire, smoke, cloud; none: of all", (),
+        max_length=16)
+    size: Annotated[tuple[Even, Even], Strict(False)] = key("columns and rows of a made clip", (320, 240), "pixels")
+    length: int = key("length of a made clip", 96, "frames", ge=16, le=480, multiple_of=8)
+    files: Annotated[tuple[Asset, ...], Strict(False)] = key(
+        "videos of fluids, by a fixed camera, without a cut", (), max_length=150)
+
+    def recipes(self) -> list[Any]:
+        """The recipes of the made clips: the first `count` of the catalogue that are of the families."""
+        from synth.photo.clips import catalogue
+
+        found = [recipe for recipe in catalogue(150) if not self.families or recipe.family in self.families]
+        return found[:self.count]
+
+
+def names(scene: PhotoScene, kind: str) -> list[str]:
+    """The artifacts of all clips, "clip" or "index"."""
+    return [f"{kind}-{number:03d}" for number in range(1, len(scene.clips.recipes()) + len(scene.clips.files) + 1)]
+
+
+def make_clip(scene: PhotoScene, inputs: Inputs, frames: list[int], family: str, seed: int, variation: dict[str, Any],
+              ) -> Iterator[tuple[int, arrays.Arrays]]:
+    """A made clip, by its recipe."""
+    from synth.photo.clips import clip
+
+    made = clip(family, seed, scene.clips.length, scene.clips.size, **variation)
+    yield 0, {"luma": made.luma, "velocity": made.velocity}
+
+
+def make_own_clip(scene: PhotoScene, inputs: Inputs, frames: list[int], number: int,
+                  ) -> Iterator[tuple[int, arrays.Arrays]]:
+    """A user's clip, whose velocity is what its optical flow says."""
+    yield 0, {"luma": own_clip(scene, number)}
+
+
+def own_clip(scene: PhotoScene, number: int) -> np.ndarray:
+    """The frames (T, Y, X) uint8 of a user's video, lowest row first. Raises BadInput for one that is no use."""
+    file, at = scene.clips.files[number], f"clips.files[{number}]"
+    read = video.read_grey(file, at)
+    if len(read) < LEAST:
+        raise BadInput(file, at, f"has {len(read)} frames; a clip has at least {LEAST}")
+    steps = np.abs(np.diff(read, axis=0)).mean(axis=(1, 2))
+    if steps.max() <= 1e-4:
+        raise BadInput(file, at, "nothing moves in it")
+    if steps.max() > CUT * max(float(np.median(steps)), 2e-3):
+        raise BadInput(file, at, f"has a cut after frame {int(steps.argmax()) + 1}")
+    shift = camera(read)
+    if shift > SHAKEN:
+        raise BadInput(file, at, f"the camera moves, by {shift:.1f} pixels a frame")
+    return np.rint(255 * np.clip(read, 0, 1)).astype(np.uint8)
+
+
+def camera(frames: np.ndarray) -> float:
+    """By how many pixels the whole of a frame moves from one to the next, at the median: frames (T, Y, X).
+
+    By phase correlation of what is on the border of the picture, where a fluid seldom is on all sides.
+    """
+    height, width = frames.shape[1:]
+    edge = max(8, min(height, width) // 6)
+    found = []
+    for part in (np.s_[:edge], np.s_[-edge:], np.s_[:, :edge], np.s_[:, -edge:]):
+        moves = [_shift(a[part], b[part]) for a, b in zip(frames[:-1:4], frames[1::4], strict=False)]
+        found.append(np.median(moves))
+    # where three sides move, all does
+    return float(np.sort(found)[1])
+
+
+def _shift(one: np.ndarray, other: np.ndarray) -> float:
+    """Pixels from one picture to the other, by the peak of their cross-power spectrum."""
+    a, b = (np.fft.rfft2(p - p.mean()) for p in (one, other))
+    cross = a * np.conj(b)
+    peak = np.fft.irfft2(cross / np.maximum(np.abs(cross), 1e-12), one.shape)
+    y, x = np.unravel_index(int(peak.argmax()), one.shape)
+    return float(np.hypot(min(y, one.shape[0] - y), min(x, one.shape[1] - x)))
+
+
+def make_codebook(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
+                  ) -> Iterator[tuple[int, arrays.Arrays]]:
+    """Visual words of the exposures of all clips (§4)."""
+    from synth.photo.index import exposures
+    from synth.photo.pieces import Cut
+    from synth.photo.words import codebook, descriptors
+
+    step = Cut(scene.assignment.piece).step
+    samples = [descriptors(picture, step).reshape(-1, 128)[::SAMPLED]
+               for name in clips for picture in exposures(inputs.read(name)["luma"])]
+    yield 0, {"words": codebook(np.concatenate(samples))}
+
+
+def make_index(scene: PhotoScene, inputs: Inputs, frames: list[int], clip: str) -> Iterator[tuple[int, arrays.Arrays]]:
+    """The pieces of one clip."""
+    from synth.photo.index import index
+    from synth.photo.pieces import Cut
+
+    stored = inputs.read(clip)
+    found = index(stored["luma"], inputs.read("codebook")["words"], Cut(scene.assignment.piece), stored.get("velocity"))
+    yield 0, vars(found)
+
+
+def check_clips(scene: PhotoScene) -> None:
+    """Refuses a user's clips before anything is made."""
+    for number in range(len(scene.clips.files)):
+        own_clip(scene, number)
+
+
+def clip_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
+    """The clips, the codebook and the index of each clip."""
+    recipes, clips, index = scene.clips.recipes(), names(scene, "clip"), names(scene, "index")
+
+    def one(name: str, reads: tuple[str, ...], needs: Sequence[str], make: Any, **more: Any) -> Artifact:
+        return Artifact(name, "synth", arrays.ARRAYS, reads, tuple((n, "once") for n in needs), make, animated=False,
+                        shared=True, **more)
+
+    return (
+        *(one(name, ("clips.size", "clips.length"), (), make_clip, arguments={
+            "family": of.family, "seed": of.seed, "variation": dict(of.variation)})
+          for name, of in zip(clips, recipes, strict=False)),
+        *(one(name, ("clips.files",), (), make_own_clip, arguments={"number": k}, check=check_clips)
+          for k, name in enumerate(clips[len(recipes):])),
+        one("codebook", ("assignment.piece",), clips, make_codebook, arguments={"clips": clips}),
+        *(one(name, ("assignment.piece",), ("codebook", clip), make_index, arguments={"clip": clip})
+          for name, clip in zip(index, clips, strict=True)))

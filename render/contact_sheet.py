@@ -1,0 +1,33 @@
+"""Clips on one sheet, to be looked at: three frames of each, and the mean of all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from render.layout import Panel, figure, fitted
+from synth.photo.clip import Clip
+
+
+def panels(name: str, clip: Clip, width: int) -> list[Panel]:
+    """Frames 0, T / 3 and 2 T / 3 of a clip and the mean of its frames, `width` pixels wide; the first has the name."""
+    frames = clip.chroma if clip.chroma is not None else np.repeat(clip.luma[..., None], 3, axis=-1)
+    length = len(frames)
+    mean = np.rint(frames.mean(0, dtype=np.float64)).astype(np.uint8)
+    chosen = [frames[0], frames[length // 3], frames[2 * length // 3], mean]
+    # row 0 of a clip is the lowest, of a picture the highest
+    return [Panel(fitted(np.ascontiguousarray(frame[::-1]), width), label)
+            for frame, label in zip(chosen, (name, "", "", "mean"), strict=True)]
+
+
+def contact_sheet(clips: Sequence[tuple[str, Clip]], width: int = 160, beside: int = 2) -> np.ndarray:
+    """All clips with their names on one sheet, (h, w, 3) uint8 sRGB.
+
+    width   of each panel, pixels
+    beside  clips in a row of the sheet
+    """
+    strips = [panels(name, clip, width) for name, clip in clips]
+    rows = [[panel for strip in strips[first : first + beside] for panel in strip]
+            for first in range(0, len(strips), beside)]
+    return figure(rows, letter=12, gap=4, margin=10)

@@ -1,0 +1,137 @@
+"""A photograph begins to flow (okabe11 §3, fig. 2): assignment, differences, the look of the target, dynamic
+boundaries.
+
+The paper's frame is the average image and the differences. Ours mixes in the photograph itself, carried along the
+motion, by one number from 0, the paper's, to 1: it keeps the streaks and edges by which the viewer knows the picture,
+and the differences add what the picture does not have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from synth.photo.appearance import added, average, extended, gains, matched
+from synth.photo.assign import Nodes, Shown, Wanted
+from synth.photo.boundary import dynamic_matte
+from synth.photo.integrate import Differences, motion_field
+from synth.photo.motion import optical_flow
+from synth.photo.photograph import carried
+from synth.photo.pieces import Cut
+
+CALMED = 0.35
+"""What of the differences is left, of their full strength, where the photograph is carried in full: it moves itself."""
+REGION = 64
+"""Pixels of a region in which histograms are matched."""
+TOWARDS = 0.9
+"""Share of the wanted direction in the motion that the photograph is carried by; the rest is that of the pieces."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """How frames are composed.
+
+    carried   0..1: the photograph carried along the motion, in place of the blurred average
+    strength  of the differences
+    matching  "gains": by the strength of bands, over all time, for fire and smoke; "histograms": frame by frame and
+              region by region as in the paper, for water; "none"
+    """
+
+    carried: float = 0.85
+    strength: float = 1.0
+    matching: Literal["gains", "histograms", "none"] = "gains"
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.carried <= 1 or self.strength < 0:
+            raise ValueError(f"the carried share is in 0..1 and the strength not negative, not {self.carried} and "
+                             f"{self.strength}")
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A picture that shall flow.
+
+    picture     (Y, X, 3) float32, display-encoded, 0..1, row 0 the lowest
+    matte       (Y, X) float32 in 0..1: where the fluid is
+    background  (Y, X, 3) float32: what is seen where the matte leaves; None: the picture
+    frozen      (Y, X) bool: what stands still in the fluid; None: nothing
+    wanted      the user's orientation and speed
+    """
+
+    picture: np.ndarray
+    matte: np.ndarray
+    background: np.ndarray | None = None
+    frozen: np.ndarray | None = None
+    wanted: Wanted = field(default_factory=Wanted)
+
+    @property
+    def fluid(self) -> np.ndarray:
+        """The matte without what stands still: (Y, X) float32."""
+        return self.matte if self.frozen is None else np.where(self.frozen, np.float32(0), self.matte)
+
+    @property
+    def grey(self) -> np.ndarray:
+        """(Y, X) uint8, what descriptors see."""
+        return np.rint(255 * np.clip(self.picture.mean(axis=2), 0, 1)).astype(np.uint8)
+
+
+def motion(target: Target, of: Nodes, shown: Shown, cut: Cut) -> np.ndarray:
+    """The motion (Y, X, 2) float32, pixels per frame: the pieces', turned towards what the user wants, at the wanted
+    speed; zero outside the fluid."""
+    found = motion_field(of, shown, target.matte.shape, cut)
+    speed = np.hypot(found[..., 0], found[..., 1]) if target.wanted.speed is None else target.wanted.speed
+    turned = found
+    if target.wanted.orientation is not None:
+        turned = TOWARDS * speed[..., None] * target.wanted.orientation + (1 - TOWARDS) * found
+    size = np.hypot(turned[..., 0], turned[..., 1])
+    scaled = turned * (speed / np.maximum(size, 1e-6))[..., None]
+    return np.where(target.fluid[..., None] > 0, scaled, 0).astype(np.float32)
+
+
+def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, seed: int) -> Iterator[np.ndarray]:
+    """The fluid of each frame (Y, X, 3) float32, everywhere: §6, "Recovery of Color Appearance", "Appearance Matching".
+
+    moves  the motion (Y, X, 2) as `motion` gives it
+
+    1. The ground: the average, and the photograph carried.
+    2. The differences, matched to the target.
+    """
+    length = more.bands.shape[1]
+    fluid = extended(target.picture, target.matte)
+    # 1. ground
+    still = average(fluid, moves) if look.carried < 1 else fluid
+    moving = carried(fluid, moves, length, seed, target.frozen) if look.carried > 0 else None
+    grey = fluid.mean(axis=2)
+    strength = look.strength * (1 - look.carried * (1 - CALMED))
+    # 2. differences
+    scale = (np.full_like(more.bands[:, 0], 1 / 255) if look.matching == "none"
+             else gains(grey, more.bands, target.fluid))
+    for frame in range(length):
+        ground = still if moving is None else (1 - look.carried) * still + look.carried * moving[frame]
+        shown = added(ground, (scale * more.bands[:, frame]).sum(axis=0) * strength)
+        if look.matching == "histograms":
+            wanted = matched(shown.mean(axis=2), grey, target.fluid, REGION)
+            shown = added(shown, wanted - shown.mean(axis=2))
+        yield shown
+
+
+def mattes(target: Target, fluid: np.ndarray, dynamics: float) -> np.ndarray:
+    """The matte of each frame: (T, Y, X) float32, moved with `dynamics` (τ of §6); 0: it stands still.
+
+    fluid  (T, Y, X) uint8, grey: the frames of `composed`, whose optical flow is "the motion field M_i of the
+           synthesized animation"
+    """
+    if dynamics == 0:
+        return np.broadcast_to(target.matte, fluid.shape)
+    return dynamic_matte(target.matte, optical_flow(fluid), dynamics)
+
+
+def over_background(target: Target, shown: np.ndarray, matte: np.ndarray) -> np.ndarray:
+    """A frame (Y, X, 3) of the fluid over what is behind it, by a matte (Y, X): float32. What is frozen is the
+    picture's."""
+    cover = matte if target.frozen is None else np.where(target.frozen, np.float32(0), matte)
+    behind = target.picture if target.background is None else target.background
+    return (cover[..., None] * shown + (1 - cover[..., None]) * behind).astype(np.float32)

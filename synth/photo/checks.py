@@ -1,0 +1,107 @@
+"""Whether a clip may enter a database: it moves, keeps its range, stays the same throughout, repeats without a jump,
+its mean has detail, and its velocity is what is seen.
+
+Pictures alone do not show a thin line at the edge where a fall should be; `faults` names what is wrong.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from synth.photo.clip import Clip
+
+MOVES = 2.0  # grey levels that a moving pixel deviates by
+NEAR = 4  # frames on either side of the end of a loop
+FINE = 6.0  # pixels: detail is what a blur of this deviation removes
+LEAST_SPEED = 0.3  # pixels per frame; slower directions are not compared
+LEAST_COVERAGE = 0.3
+
+# what a clip may have at worst
+LEAST_MOVING = 0.05
+MOST_CLIPPED = 0.02
+MOST_DRIFT = 0.15
+MOST_JUMP = 1.05
+LEAST_DETAIL = 0.3
+MOST_TURN = 30.0
+
+
+def moving(clip: Clip) -> float:
+    """The share of pixels whose grey deviates by more than MOVES over time."""
+    return float((_deviation(clip.luma) > MOVES).mean())
+
+
+def clipped(clip: Clip) -> float:
+    """The share of values, over all pixels and frames, that are black or white."""
+    return float(((clip.luma == 0) | (clip.luma == 255)).mean())
+
+
+def drift(clip: Clip) -> float:
+    """How far the halves of a clip differ, in mean and in deviation over pixels, in deviations of the whole."""
+    luma = clip.luma
+    first, second = luma[: len(luma) // 2].astype(np.float32), luma[len(luma) // 2 :].astype(np.float32)
+    return float(max(abs(first.mean() - second.mean()), abs(first.std() - second.std())) / luma.std())
+
+
+def jump(clip: Clip) -> float:
+    """The mean difference of the last frame and the first, over the median of the NEAR steps before it and after it.
+
+    Not of all steps: the pace of clouds and flames itself changes in the course of a clip.
+    """
+    around = np.roll(clip.luma, NEAR, axis=0)[: 2 * NEAR + 1].astype(np.int16)
+    steps = np.abs(np.diff(around, axis=0)).mean((1, 2))
+    others = np.delete(steps, NEAR - 1)
+    return float(steps[NEAR - 1] / max(np.median(others), 1e-6))
+
+
+def detail(clip: Clip) -> float:
+    """The deviation of detail in the mean picture, over that in one frame."""
+    mean = _fine(clip.luma.astype(np.float32).mean(0)).std()
+    frames = [_fine(frame.astype(np.float32)).std() for frame in clip.luma[:: max(1, len(clip.luma) // 8)]]
+    return float(mean / max(np.mean(frames), 1e-6))
+
+
+def turn(clip: Clip, pairs: int = 16) -> float:
+    """The median angle, degrees, between the velocity and what optical flow sees on the mean of `pairs` frames.
+
+    Only where fluid covers LEAST_COVERAGE, moves at LEAST_SPEED and changes by MOVES; 180 where there is no such pixel.
+    The flow is Dense Inverse Search [Kroeger et al. 2016].
+    """
+    flow = seen(clip, pairs)
+    v = clip.velocity
+    there = (clip.coverage > LEAST_COVERAGE) & (np.hypot(v[..., 0], v[..., 1]) > LEAST_SPEED)
+    there &= _deviation(clip.luma) > MOVES
+    if not there.any():
+        return 180.0
+    angle = np.arctan2(v[..., 0] * flow[..., 1] - v[..., 1] * flow[..., 0], (v * flow).sum(-1))
+    return float(np.degrees(np.median(np.abs(angle[there]))))
+
+
+def seen(clip: Clip, pairs: int) -> np.ndarray:
+    """The mean optical flow of `pairs` pairs of successive frames, (Y, X, 2) float32, pixels per frame, y up."""
+    import cv2
+
+    search = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    total = np.zeros((*clip.luma.shape[1:], 2), np.float32)
+    for t in np.linspace(0, len(clip.luma) - 2, pairs).astype(int):
+        total += search.calc(clip.luma[t], clip.luma[t + 1], None)
+    return total / pairs
+
+
+def faults(clip: Clip) -> list[str]:
+    """What keeps a clip from a database, one line each; empty for a good one."""
+    measured = [(moving(clip), LEAST_MOVING, "moves: {:.3f} of the pixels, at least {}"),
+                (-clipped(clip), -MOST_CLIPPED, "is clipped: {:.3f} of the values, at most {}"),
+                (-drift(clip), -MOST_DRIFT, "changes: its halves differ by {:.3f} deviations, at most {}"),
+                (-jump(clip), -MOST_JUMP, "jumps from its last frame to the first: {:.3f} steps, at most {}"),
+                (detail(clip), LEAST_DETAIL, "has a flat mean: {:.3f} of a frame's detail, at least {}"),
+                (-turn(clip), -MOST_TURN, "moves otherwise than its velocity: by {:.1f} degrees, at most {}")]
+    return [text.format(abs(value), abs(bound)) for value, bound, text in measured if value < bound]
+
+
+def _deviation(luma: np.ndarray) -> np.ndarray:
+    return luma.astype(np.float32).std(0)
+
+
+def _fine(picture: np.ndarray) -> np.ndarray:
+    return picture - ndimage.gaussian_filter(picture, FINE)

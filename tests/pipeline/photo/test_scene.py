@@ -1,0 +1,29 @@
+"""Scenes of photographs: one line for what does not fit together."""
+
+from pathlib import Path
+
+import pytest
+from tiny import PHOTO, changed, complaint, written
+
+from pipeline.scene import load
+
+
+def test_a_table_photo_makes_it_a_scene_of_them(tmp_path: Path) -> None:
+    loaded = load(written(tmp_path, PHOTO))
+    assert loaded.method.name == "okabe11"
+    assert loaded.variants[""].assignment.settings().candidates == 20
+
+
+@pytest.mark.parametrize(("old", "new", "told"), [
+    ("count = 1", "count = 0", "clips.count: is 0, and clips.files is empty: there is no clip"),
+    ("piece = 16", "piece = 32", "assignment.piece: pieces of 32 pixels do not fit into clips of 64 x 64 at half their "
+                                 "size"),
+    ('["cloud"]', '["clouds"]', "clips.families: there is no family 'clouds', only fall, white-water, river, fire, "
+                                "smoke, cloud, bay, shallow, lake"),
+    ("panel = 32", "panel = 32\nmoments = [9]", "figure.moments[0]: the animation has 8 frames"),
+    ("width = 96", "width = 20", "photo.width: should be greater than or equal to 64, not 20"),
+    ("width = 96", "width = 96\ndynamics = 1.0", "photo.dynamics: should be less than 1, not 1.0"),
+    ("piece = 16", "piece = 40", "assignment.piece: should be a multiple of 16, not 40"),
+])
+def test_what_does_not_fit_is_one_line(tmp_path: Path, old: str, new: str, told: str) -> None:
+    assert complaint(written(tmp_path, changed(PHOTO, old, new))) == told
