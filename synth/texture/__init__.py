@@ -7,6 +7,7 @@ In the order data passes through them:
     sample      what is compared, the main direction, the rotated copies (§2.1)
     flow        direction of the flow, its speed within limits, motion along it (§2.2, §3)
     cells       squares over which direction or velocity differ little, for the paper's method (§2.1, §2.2.1)
+    kept        states as arrays, for runs that go on
     paper       the paper's method: colours that are carried in cells (§2)
     patches     what patches of a sample cover and show, and which place of it continues a picture
     anchors     which places of the sample patches may take

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy import ndimage
 
-from synth.texture.patches import SPREAD, Painter
+from synth.texture.patches import MATCHED, SPREAD, Painter, pairs_within
 
 LIVELY = 8.0
 """σ, in pixels, of the round in which the sample's variance counts."""
@@ -53,6 +53,20 @@ class Anchors:
         picture = self.painter.sample.luminance.astype(np.float64)
         squared = (picture - picture.mean()) ** 2
         return 0.5 + 0.5 * ndimage.gaussian_filter(squared, LIVELY, mode="mirror") / squared.mean()
+
+    def rounds(self, points: np.ndarray, radius: np.ndarray) -> np.ndarray:
+        """The round, from 1, in which each newborn at points (B, D), pixels, of radius (B,) is matched: (B,) int32.
+
+        After those of all earlier ones that may reach it, so that all of a round are matched at once, as if in order.
+        """
+        later, earlier = pairs_within(points, points, MATCHED * np.sqrt(self.painter.elongation) * radius,
+                                      self.painter.extent(radius))
+        starts = np.searchsorted(later, np.arange(len(points) + 1))
+        rounds = np.zeros(len(points), np.int32)
+        for k in range(len(points)):
+            # those not yet numbered are later ones: 0
+            rounds[k] = 1 + rounds[earlier[starts[k]:starts[k + 1]]].max(initial=0)
+        return rounds
 
     def anywhere(self, radius: np.ndarray, frame: int, number: int) -> np.ndarray:
         """An anchor (2,) at random for a patch of radius (1,), by the frame it is born in and its number."""

@@ -10,8 +10,7 @@ What it does not do: more than one resolution. A feature longer than two radii i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -21,6 +20,7 @@ from scipy.spatial import cKDTree
 from synth import opencl
 from synth.texture import flow, measures
 from synth.texture.anchors import Anchors
+from synth.texture.kept import Kept
 from synth.texture.patches import (
     AX,
     AY,
@@ -44,7 +44,6 @@ from synth.texture.patches import (
     Painter,
     Query,
     Table,
-    pairs_within,
     sees_reference,
 )
 from synth.texture.sample import Sample, luminance
@@ -132,7 +131,7 @@ class Settings:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class State(Kept):
     """All that the next frame and the picture need: P living patches, in order of birth, and the use of the sample.
 
     frame, born  number of this frame, from 1; patches born so far, which numbers the next
@@ -166,16 +165,6 @@ class State:
     seam: np.ndarray
     usage: np.ndarray
     mask: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), bool))
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Every part under its name, to be kept."""
-        return {part.name: np.asarray(getattr(self, part.name)) for part in fields(self)}
-
-    @classmethod
-    def of(cls, arrays: Mapping[str, np.ndarray]) -> State:
-        """The state that gave these arrays."""
-        parts: dict[str, Any] = {name: arrays[name] for name in (part.name for part in fields(cls))}
-        return cls(**parts | {"frame": int(parts["frame"]), "born": int(parts["born"]), "blend": float(parts["blend"])})
 
 
 PATCHES = ("centre", "axis", "bend", "anchor", "radius", "weight", "age", "fading", "id", "seam")
@@ -596,7 +585,7 @@ class Synthesis:
         # 1. rounds
         order = self._order(now, new)
         rank = np.zeros(len(now.id), np.int32)
-        rank[new[order]] = self._rounds(now, new[order])
+        rank[new[order]] = self.anchors.rounds(now.centre[new[order]], now.radius[new[order]])
         radius = now.radius[new]
         table = self._table(now, ground)
         lists = painter.around(table, new, MATCHED * radius)
@@ -622,18 +611,6 @@ class Synthesis:
         neighbours on one side."""
         away = now.centre[new] - (np.array(self.shape[::-1]) - 1) / 2
         return np.argsort((away * away).sum(axis=1), kind="stable")
-
-    def _rounds(self, now: State, new: np.ndarray) -> np.ndarray:
-        """The round of each newborn, from 1, in the order given."""
-        centre, extent = now.centre[new], self.painter.extent(now.radius[new])
-        later, earlier = pairs_within(centre, centre, MATCHED * np.sqrt(self.settings.elongation) * now.radius[new],
-                                      extent)
-        starts = np.searchsorted(later, np.arange(len(new) + 1))
-        rounds = np.zeros(len(new), np.int32)
-        for k in range(len(new)):
-            # those not yet numbered are later ones: 0
-            rounds[k] = 1 + rounds[earlier[starts[k]:starts[k + 1]]].max(initial=0)
-        return rounds
 
     # 6. blend
 

@@ -19,7 +19,7 @@ loads from cache; places whose error passes the least so far are given up early.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -29,6 +29,7 @@ from scipy import ndimage
 from synth import opencl
 from synth.texture import flow
 from synth.texture.cells import LARGEST, SMALLEST, Cells, Spread, by_direction, by_velocity, index
+from synth.texture.kept import Kept
 from synth.texture.sample import Sample, rotated
 
 ROWS_TOGETHER = 4
@@ -76,7 +77,7 @@ class Settings:
 
 
 @dataclass
-class State:
+class State(Kept):
     """A frame, and all that the next one needs.
 
     colour        (Y, X, 3) float32, linear light; zero where there is no texture
@@ -99,15 +100,6 @@ class State:
     texture: np.ndarray
     resynthesized: float
     number: int
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Everything as arrays, by name; `State.of` makes the same state of them."""
-        return {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
-
-    @classmethod
-    def of(cls, arrays: dict[str, np.ndarray]) -> State:
-        kept = {f.name: np.array(arrays[f.name]) for f in fields(cls)}
-        return cls(resynthesized=float(kept.pop("resynthesized")), number=int(kept.pop("number")), **kept)
 
 
 def blending(d: np.ndarray, D: int) -> np.ndarray:

@@ -9,8 +9,7 @@ What it does not do: repair seams that the field has torn, and more than one res
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ from synth.texture.anchors import Anchors
 from synth.texture.atlas import LANES, Texels
 from synth.texture.carry import FEWEST, TURN, Settings
 from synth.texture.charts import Centres, Pieces, charts, pieces
+from synth.texture.kept import Kept
 from synth.texture.mesh import Mesh, continued, dot, length, turning, unit, walked
 from synth.texture.patches import (
     AX,
@@ -36,7 +36,6 @@ from synth.texture.patches import (
     STEEP,
     Painter,
     Query,
-    pairs_within,
 )
 from synth.texture.sample import Sample, luminance
 
@@ -49,7 +48,7 @@ STENCILS = 2048
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class State(Kept):
     """All that the next frame and the picture need: P living patches, in order of birth, and the use of the sample.
 
     frame, born  number of this frame, from 1; patches born so far, which numbers the next
@@ -75,16 +74,6 @@ class State:
     fading: np.ndarray
     id: np.ndarray
     usage: np.ndarray
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Every part under its name, to be kept."""
-        return {part.name: np.asarray(getattr(self, part.name)) for part in fields(self)}
-
-    @classmethod
-    def of(cls, arrays: Mapping[str, np.ndarray]) -> State:
-        """The state that gave these arrays."""
-        parts: dict[str, Any] = {name: arrays[name] for name in (part.name for part in fields(cls))}
-        return cls(**parts | {"frame": int(parts["frame"]), "born": int(parts["born"]), "blend": float(parts["blend"])})
 
 
 PATCHES = ("face", "place", "anchor", "weight", "age", "fading", "id")
@@ -336,7 +325,8 @@ class Synthesis:
         radius = values[:, RADIUS]
         rank = np.zeros(len(now.id), np.int32)
         order = self._order(now, new)
-        rank[order] = self._rounds(now, order, radius[order])
+        points = self.mesh.at(self.mesh.vertices, now.face[order], now.place[order]) / self.scale
+        rank[order] = self.anchors.rounds(points, radius[order])
         usage = now.usage
         for number in range(1, int(rank.max()) + 1):
             who = np.flatnonzero(rank == number).astype(np.int32)
@@ -360,18 +350,6 @@ class Synthesis:
         on one side."""
         points = self.mesh.at(self.mesh.vertices, now.face[new], now.place[new])
         return np.asarray(new[np.argsort(length(points - points[0]), kind="stable")])
-
-    def _rounds(self, now: State, new: np.ndarray, radius: np.ndarray) -> np.ndarray:
-        """The round of each newborn, from 1, in the order given: after those of all earlier ones that may reach it."""
-        points = self.mesh.at(self.mesh.vertices, now.face[new], now.place[new]) / self.scale
-        later, earlier = pairs_within(points, points, MATCHED * np.sqrt(self.settings.elongation) * radius,
-                                      self.painter.extent(radius))
-        starts = np.searchsorted(later, np.arange(len(new) + 1))
-        rounds = np.zeros(len(new), np.int32)
-        for k in range(len(new)):
-            # those not yet numbered are later ones: 0
-            rounds[k] = 1 + rounds[earlier[starts[k]:starts[k + 1]]].max(initial=0)
-        return rounds
 
     # 5. blend
 
