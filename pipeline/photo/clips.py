@@ -27,8 +27,6 @@ LEAST = 8
 """Frames of a user's clip, at least."""
 CUT = 4.0
 """A cut: a frame that differs from the next so many times as much as half of them do."""
-SHAKEN = 0.75
-"""Pixels that a whole frame moves from one to the next, at the median: the camera moves."""
 Even = Annotated[int, Field(ge=64, le=1920, multiple_of=2)]
 Families = tuple[str, ...]
 
@@ -75,6 +73,8 @@ def make_own_clip(scene: PhotoScene, inputs: Inputs, frames: list[int], number: 
 
 def own_clip(scene: PhotoScene, number: int) -> np.ndarray:
     """The frames (T, Y, X) uint8 of a user's video, lowest row first. Raises BadInput for one that is no use."""
+    from synth.photo.checks import SHAKEN, camera
+
     file, at = scene.clips.files[number], f"clips.files[{number}]"
     read = video.read_grey(file, at)
     if len(read) < LEAST:
@@ -84,34 +84,11 @@ def own_clip(scene: PhotoScene, number: int) -> np.ndarray:
         raise BadInput(file, at, "nothing moves in it")
     if steps.max() > CUT * max(float(np.median(steps)), 2e-3):
         raise BadInput(file, at, f"has a cut after frame {int(steps.argmax()) + 1}")
-    shift = camera(read)
+    luma = np.rint(255 * np.clip(read, 0, 1)).astype(np.uint8)
+    shift = camera(luma)
     if shift > SHAKEN:
         raise BadInput(file, at, f"the camera moves, by {shift:.1f} pixels a frame")
-    return np.rint(255 * np.clip(read, 0, 1)).astype(np.uint8)
-
-
-def camera(frames: np.ndarray) -> float:
-    """By how many pixels the whole of a frame moves from one to the next, at the median: frames (T, Y, X).
-
-    By phase correlation of what is on the border of the picture, where a fluid seldom is on all sides.
-    """
-    height, width = frames.shape[1:]
-    edge = max(8, min(height, width) // 6)
-    found = []
-    for part in (np.s_[:edge], np.s_[-edge:], np.s_[:, :edge], np.s_[:, -edge:]):
-        moves = [_shift(a[part], b[part]) for a, b in zip(frames[:-1:4], frames[1::4], strict=False)]
-        found.append(np.median(moves))
-    # where three sides move, all does
-    return float(np.sort(found)[1])
-
-
-def _shift(one: np.ndarray, other: np.ndarray) -> float:
-    """Pixels from one picture to the other, by the peak of their cross-power spectrum."""
-    a, b = (np.fft.rfft2(p - p.mean()) for p in (one, other))
-    cross = a * np.conj(b)
-    peak = np.fft.irfft2(cross / np.maximum(np.abs(cross), 1e-12), one.shape)
-    y, x = np.unravel_index(int(peak.argmax()), one.shape)
-    return float(np.hypot(min(y, one.shape[0] - y), min(x, one.shape[1] - x)))
+    return luma
 
 
 def make_codebook(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],

@@ -24,6 +24,11 @@ MOST_DRIFT = 0.15
 MOST_JUMP = 1.05
 LEAST_DETAIL = 0.3
 MOST_TURN = 30.0
+SHAKEN = 0.25  # pixels that the whole frame moves from one to the next: the camera moves
+
+PAIRS = 12  # frames that are compared with their next, to know a camera that moves
+BORDER = 8  # pixels that come into view
+EXPLAINED = 0.5  # of the change between two frames, what is left when a shift explains it
 
 
 def moving(clip: Clip) -> float:
@@ -105,3 +110,25 @@ def _deviation(luma: np.ndarray) -> np.ndarray:
 
 def _fine(picture: np.ndarray) -> np.ndarray:
     return picture - ndimage.gaussian_filter(picture, FINE)
+
+
+def camera(luma: np.ndarray) -> float:
+    """By how many pixels a moving camera moves the whole of a frame on, at the median: luma (T, Y, X) uint8.
+
+    0 where no shift explains what changes: a river that fills the picture flows on all sides as a pan does, but it
+    changes its shape, and its stones stay.
+    """
+    pairs = range(0, len(luma) - 1, max(1, (len(luma) - 1) // PAIRS))
+    return float(np.median([_panned(luma[k], luma[k + 1]) for k in pairs]))
+
+
+def _panned(one: np.ndarray, other: np.ndarray) -> float:
+    """Length of the shift that turns one frame into the other; 0 if none does."""
+    import cv2
+
+    dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    x, y = np.median(dis.calc(one, other, None).reshape(-1, 2), axis=0)
+    moved = ndimage.shift(one.astype(np.float32), (y, x), order=1, mode="nearest")
+    inside = np.s_[BORDER:-BORDER, BORDER:-BORDER]
+    left = np.abs(other - moved)[inside].mean()
+    return float(np.hypot(x, y)) if left < EXPLAINED * np.abs(other - one.astype(np.float32))[inside].mean() else 0.0

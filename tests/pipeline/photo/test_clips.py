@@ -9,7 +9,7 @@ from tiny import PHOTO, changed, scene
 
 from pipeline.errors import BadInput
 from pipeline.files import video
-from pipeline.photo.clips import camera, check_clips, names, own_clip
+from pipeline.photo.clips import check_clips, names, own_clip
 from pipeline.photo.method import METHOD
 
 OWN = changed(PHOTO, "count = 1", 'count = 0\nfiles = ["c.mp4"]')
@@ -74,13 +74,6 @@ def test_a_cut_a_moving_camera_and_a_still_are_told(tmp_path: Path) -> None:
                          (still, "nothing moves in it"), (falling(4), "has 4 frames; a clip has at least 8")):
         with pytest.raises(BadInput, match=rf"c\.mp4: clips\.files\[0\]: {told}"):
             check_clips(scene(write(tmp_path, frames), OWN))
-
-
-def test_a_fluid_that_fills_the_picture_is_no_camera() -> None:
-    """It boils: no shift of the whole fits."""
-    boiling = np.stack([grain(k, (96, 128)) * 0.4 + grain(99, (96, 128)) * 0.6 for k in range(12)])
-    assert camera(boiling) < 0.75
-    assert camera(falling()) < 0.75
 
 
 def test_a_damaged_clip_is_one_line(tmp_path: Path) -> None:

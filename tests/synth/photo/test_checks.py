@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from synth.photo import checks
 from synth.photo.clip import Clip, eight_bit
@@ -59,3 +60,20 @@ def test_a_loop_jumps_by_a_step():
 
 def test_where_nothing_moves_no_direction_is_right():
     assert checks.turn(spoilt(velocity=0 * GOOD.velocity)) == 180
+
+
+def grain(seed, shape=(96, 128)):
+    values = ndimage.gaussian_filter(np.random.Generator(np.random.Philox(seed)).random(shape), 2, mode="wrap")
+    return (values - values.min()) / np.ptp(values)
+
+
+def test_a_camera_that_pans_is_told_from_a_fluid():
+    """Water that falls in the middle of a wall, and one that fills the picture and boils, are no camera."""
+    pan = np.stack([np.roll(grain(3, (96, 256)), 2 * k, axis=1)[:, :128] for k in range(12)])
+    inside = (np.arange(128) > 47) & (np.arange(128) < 80)
+    falling = np.stack([np.where(inside, np.roll(grain(2), 3 * k, axis=0), grain(1)) for k in range(12)])
+    boiling = np.stack([0.4 * grain(k) + 0.6 * grain(99) for k in range(12)])
+    pan, falling, boiling = (np.uint8(255 * frames) for frames in (pan, falling, boiling))
+    assert checks.camera(pan) == pytest.approx(2, abs=0.1)
+    assert checks.camera(falling) < checks.SHAKEN
+    assert checks.camera(boiling) < checks.SHAKEN
