@@ -35,8 +35,7 @@ class CeramicRender(Framed, Look):
         from render.studio import Shot
 
         stored = inputs.read("surface")
-        normals, uv = (np.stack([stored[name] for name in names], axis=-1) for names in (("nx", "ny", "nz"), "st"))
+        uv = np.stack([stored[name] for name in "st"], axis=-1)
         shot = Shot(self.width, self.height, self.spp, scene.seed)
         for frame in frames:
-            yield frame, ceramic.picture(stored["vertices"], stored["faces"], normals, uv, inputs.read("frames", frame),
-                                         shot)
+            yield frame, ceramic.picture(stored["vertices"], stored["faces"], uv, inputs.read("frames", frame), shot)
