@@ -2,10 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tiny import PHOTO, changed, complaint, written
 
+from pipeline.files import pictures, video
 from pipeline.scene import load
+from pipeline.tables import PROJECT_SCENES
 
 
 def test_a_table_photo_makes_it_a_scene_of_them(tmp_path: Path) -> None:
@@ -27,3 +30,14 @@ def test_a_table_photo_makes_it_a_scene_of_them(tmp_path: Path) -> None:
 ])
 def test_what_does_not_fit_is_one_line(tmp_path: Path, old: str, new: str, told: str) -> None:
     assert complaint(written(tmp_path, changed(PHOTO, old, new))) == told
+
+
+def test_the_readmes_example_is_a_whole_scene(tmp_path: Path) -> None:
+    text = (PROJECT_SCENES / "README.md").read_text().split("## Scenes of photographs\n")[1].split("\n## ")[0]
+    example = [line.removeprefix("    ") for line in text.splitlines() if line.startswith("    ")]
+    for name in ("brook.jpg", "water.png"):
+        pictures.write(tmp_path / name, np.full((340, 400, 3), 0.5, np.float32))
+    video.write(tmp_path / "pond.mp4", [np.zeros((32, 32, 3), np.uint8)] * 2, 24)
+    one = load(written(tmp_path, 'title = "A brook"\n' + "\n".join(example))).variants[""]
+    assert len(one.photo.strokes) == 2
+    assert len(one.clips.recipes()) == 65

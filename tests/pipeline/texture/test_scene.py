@@ -40,7 +40,7 @@ def test_what_does_not_fit_is_one_line(tmp_path: Path, old: str, new: str, told:
 
 
 def test_the_readmes_example_is_a_whole_scene(tmp_path: Path) -> None:
-    text = (PROJECT_SCENES / "README.md").read_text().split("## Scenes of moving textures\n")[1]
+    text = (PROJECT_SCENES / "README.md").read_text().split("## Scenes of moving textures\n")[1].split("\n## ")[0]
     lines = [line.removeprefix("    ") for line in text.splitlines() if line.startswith("    ")]
     example, surface = lines[:lines.index("[surface]")], lines[lines.index("[surface]"):]
     pictures.write(tmp_path / "bark.png", np.random.default_rng(1).random((80, 80, 3)))
