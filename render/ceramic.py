@@ -21,8 +21,9 @@ AIR = (0.20, 0.205, 0.215)
 BACKDROP = (0.245, 0.24, 0.235)
 GLAZE = {"roughness": 0.42, "specular": 0.4, "clearcoat": 0.7, "clearcoat_gloss": 0.94}
 BOUNCES = 1
-CREASE = np.cos(np.radians(40))
-"""Cosine of the angle between triangles from which they meet in an edge: shaded as smooth it would be a black band."""
+CREASE = np.cos(np.radians(65))
+"""Cosine of the angle between triangles from which they meet in an edge: shaded as smooth it would be a black band. A
+coarse mesh of something round, as a rolled lip, turns by less from one to the next."""
 
 
 def picture(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray, texture: np.ndarray, shot: studio.Shot,
