@@ -1,13 +1,17 @@
-"""Clips on one sheet, to be looked at: three frames of each, and the mean of all."""
+"""Clips on one sheet, to be looked at: three frames of each and the mean of all, or a small picture of each."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from render.layout import Panel, figure, fitted
 from synth.photo.clip import Clip
+
+GAP = 2
+"""Pixels between thumbnails."""
 
 
 def panels(name: str, clip: Clip, width: int) -> list[Panel]:
@@ -31,3 +35,26 @@ def contact_sheet(clips: Sequence[tuple[str, Clip]], width: int = 160, beside: i
     rows = [[panel for strip in strips[first : first + beside] for panel in strip]
             for first in range(0, len(strips), beside)]
     return figure(rows, letter=12, gap=4, margin=10)
+
+
+def thumbnails(frames: Sequence[np.ndarray], width: int, aspect: float) -> np.ndarray:
+    """One frame of each clip on a sheet (h, width, 3) float32, display values on white (okabe11 fig. 3).
+
+    frames  each (Y, X) uint8 grey, row 0 the lowest
+    aspect  width over height of the sheet that is aimed at
+    They are as large as fits in columns and rows, by rows from the upper left; the first says their proportions.
+    """
+    rows, columns = frames[0].shape
+    best = math.sqrt(len(frames) * aspect * rows / columns)
+    beside = min(max(1, round(best)), len(frames))
+    edges = np.rint(np.linspace(0, width + GAP, beside + 1)).astype(int)
+    height = max(1, round((width / beside - GAP) * rows / columns))
+    page = np.ones((-(-len(frames) // beside) * (height + GAP) - GAP, width, 3), np.float32)
+    for number, frame in enumerate(frames):
+        row, column = divmod(number, beside)
+        wide = int(edges[column + 1] - edges[column] - GAP)
+        shown = fitted(np.repeat(frame[::-1, :, None], 3, axis=2), wide)
+        shown = shown[np.arange(height) * len(shown) // height]
+        top = row * (height + GAP)
+        page[top:top + height, edges[column]:edges[column] + wide] = shown
+    return page

@@ -17,7 +17,8 @@ from pipeline.photo.tables import PhotoScene
 from pipeline.photo.target import check_target, read_target
 
 
-def _cut(scene: PhotoScene) -> Any:
+def cut_of(scene: PhotoScene) -> Any:
+    """How pictures are cut into pieces."""
     from synth.photo.pieces import Cut
 
     return Cut(scene.assignment.piece)
@@ -37,7 +38,7 @@ def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index:
     from synth.photo.animate import motion
     from synth.photo.assign import assign
 
-    target, database, cut = read_target(scene), _database(inputs, index), _cut(scene)
+    target, database, cut = read_target(scene), _database(inputs, index), cut_of(scene)
     of, found = assign(target.grey, target.fluid, database, cut, target.wanted, scene.assignment.settings())
     shown = found.shown(database)
     yield 0, {"node": of.corner, "edges": of.edges, "across": of.across, "clip": shown.clip, "version": shown.version,
@@ -45,17 +46,23 @@ def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index:
               "energies": np.array(found.energies), "motion": motion(target, of, shown, cut)}
 
 
+def assigned(inputs: Inputs) -> tuple[Any, Any]:
+    """The synth.photo.assign.Nodes of the target, and what they are Shown."""
+    from synth.photo.assign import Nodes, Shown
+
+    kept = inputs.read("assignment")
+    return (Nodes(kept["node"], kept["edges"], kept["across"]),
+            Shown(kept["clip"], kept["version"], kept["corner"], kept["cells"]))
+
+
 def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
                ) -> Iterator[tuple[int, np.ndarray]]:
     """The fluid of each frame, everywhere, before the matte cuts it (§6)."""
     from render import tonemap
     from synth.photo.animate import Look, composed
-    from synth.photo.assign import Nodes, Shown
     from synth.photo.integrate import differences
 
-    target, cut, kept = read_target(scene), _cut(scene), inputs.read("assignment")
-    of = Nodes(kept["node"], kept["edges"], kept["across"])
-    shown = Shown(kept["clip"], kept["version"], kept["corner"], kept["cells"])
+    target, cut, (of, shown) = read_target(scene), cut_of(scene), assigned(inputs)
     read: dict[int, np.ndarray] = {}
 
     def luma(number: int) -> np.ndarray:
@@ -66,7 +73,8 @@ def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list
     rows, columns = target.matte.shape
     more = differences(of, shown, luma, (rows, columns), cut, scene.frames, scene.seed)
     look = Look(scene.photo.carried, scene.photo.strength, scene.photo.matching)
-    for frame, picture in enumerate(composed(target, more, kept["motion"], look, scene.seed), start=1):
+    moves = inputs.read("assignment")["motion"]
+    for frame, picture in enumerate(composed(target, more, moves, look, scene.seed), start=1):
         if frame in frames:
             yield frame, tonemap.from_srgb(np.clip(picture, 0, 1))[::-1].astype(np.float32)
         if frame == frames[-1]:
@@ -104,35 +112,14 @@ def make_frames(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterato
         yield frame, tonemap.from_srgb(np.clip(picture, 0, 1))[::-1].astype(np.float32)
 
 
-def make_target_picture(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
-    """The photograph."""
-    from render import tonemap
-
-    target = read_target(scene)
-    yield 0, tonemap.from_srgb(target.picture)[::-1].astype(np.float32)
-
-
-def make_motion_picture(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
-    """The motion by colour: its direction by hue, its speed by strength."""
-    from render import lic, tonemap
-
-    yield 0, tonemap.from_srgb(lic.colour(inputs.read("assignment")["motion"], scene.figure.panel))
-
-
 def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """All after the clips."""
     clips, index = names(scene, "clip"), names(scene, "index")
-    made = [
+    return (
         Artifact("assignment", "synth", arrays.ARRAYS, ("photo", "assignment"),
                  (("codebook", "once"), *((name, "once") for name in index)), make_assignment, {"index": index},
                  animated=False, check=check_target),
         Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
                  (("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
         Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (("fluid", "every"),), make_mattes),
-        Artifact("frames", "synth", images.LIGHT, ("photo",), (("fluid", "same"), ("mattes", "same")), make_frames)]
-    if "target" in scene.figure.panels:
-        made.append(Artifact("target", "render", images.LIGHT, ("photo",), (), make_target_picture, animated=False))
-    if "motion" in scene.figure.panels:
-        made.append(Artifact("motion", "render", images.LIGHT, ("figure.panel",), (("assignment", "once"),),
-                             make_motion_picture, animated=False))
-    return tuple(made)
+        Artifact("frames", "synth", images.LIGHT, ("photo",), (("fluid", "same"), ("mattes", "same")), make_frames))

@@ -1,21 +1,55 @@
-"""The panels of a figure of a photograph."""
+"""The panels of a figure of a photograph, and the pictures that are made for them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import groupby
+from typing import get_args
+
+from pipeline.build.artifact import Artifact
 from pipeline.build.method import Panel
-from pipeline.photo.tables import PhotoScene
+from pipeline.photo.neighbours import neighbour_views
+from pipeline.photo.pieces import piece_views
+from pipeline.photo.tables import OfPair, OfPiece, PhotoScene
+from pipeline.photo.views import View, target_view
 
 
 def panels(scene: PhotoScene) -> tuple[Panel, ...]:
     """The panels of the scene's figure; with moments, in the still one result for each."""
     full = scene.figure.panel
     made: list[Panel] = []
-    for name in scene.figure.panels:
-        if name == "result" and scene.figure.moments:
+    for shown in _shown(scene):
+        if isinstance(shown, View):
+            made.append(Panel(shown.label, shown.artifact.name, shown.width, "straight", legend=shown.legend,
+                              border=shown.border))
+        elif shown == "result" and scene.figure.moments:
             made += [Panel(f"frame {moment}", "frames", full, "straight", frame=moment, shown_in="still")
                      for moment in scene.figure.moments]
             made.append(Panel("result", "frames", full, "straight", shown_in="animation"))
         else:
-            artifact = {"target": "target", "matte": "mattes", "motion": "motion", "result": "frames"}[name]
-            made.append(Panel(name, artifact, full, "straight", legend=name == "motion"))
+            made.append(Panel(shown, {"matte": "mattes", "result": "frames"}[shown], full, "straight"))
     return tuple(made)
+
+
+def view_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
+    """The pictures that are made for panels alone."""
+    return tuple({shown.artifact.name: shown.artifact for shown in _shown(scene) if isinstance(shown, View)}.values())
+
+
+def _shown(scene: PhotoScene) -> Iterator[str | View]:
+    """The views in reading order, and "matte" and "result", which need none. Panels of pieces that follow each other
+    stand together, once for each piece."""
+    for of_piece, run in groupby(scene.figure.panels, lambda name: name in get_args(OfPiece)):
+        names = list(run)
+        if of_piece:
+            for number in range(1, len(scene.figure.pieces) + 1):
+                for name in names:
+                    yield from piece_views(scene, name, number)
+            continue
+        for name in names:
+            if name in ("matte", "result"):
+                yield name
+            elif name in get_args(OfPair):
+                yield from neighbour_views(scene, name)
+            else:
+                yield target_view(scene, name)

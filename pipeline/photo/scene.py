@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 from pipeline.build.method import Faults
-from pipeline.photo.clips import Clips
-from pipeline.photo.tables import Assignment, Figure, Photo, PhotoScene
+from pipeline.photo.clips import Clips, names
+from pipeline.photo.tables import Assignment, Figure, OfPiece, Photo, PhotoScene
 from pipeline.tables import key
 
 
@@ -32,6 +34,15 @@ def photo_fits(scene: Scene) -> Faults:
     for number, moment in enumerate(scene.figure.moments):
         if moment > scene.frames:
             yield f"figure.moments[{number}]", f"the animation has {scene.frames} frames"
+    clips = len(names(scene, "clip"))
+    for number, (clip, _, _) in enumerate(scene.figure.pieces):
+        if clip > clips:
+            yield f"figure.pieces[{number}]", f"there is no clip {clip}, only {clips}"
+    for name in scene.figure.panels:
+        if name in get_args(OfPiece) and not scene.figure.pieces:
+            yield "figure.pieces", f"is empty, and the panel \"{name}\" shows a piece"
+        if name in ("strokes", "orientation") and not scene.photo.strokes:
+            yield "photo.strokes", f"is empty, and the panel \"{name}\" shows the strokes"
 
 
 def _families() -> list[str]:

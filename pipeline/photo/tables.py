@@ -28,8 +28,8 @@ class Photo(Table):
     strokes: Annotated[tuple[Stroke, ...], Strict(False)] = key(
         "strokes along the flow, from their first point to their last, each an array of points [x, y] of the file, "
         "from its upper left corner (§5, figure 8); none: the clips alone decide", (), max_length=1000)
-    speed: Asset | None = key("a grey picture of the same size, the speed map (§5, figure 8): black rests, white is "
-                              "photo.fastest; none: the clips alone decide", None)
+    speed: Asset | None = key("a grey picture of the same proportions, the speed map (§5, figure 8), as speed.png is: "
+                              "black rests, white is photo.fastest; none: the clips alone decide", None)
     fastest: float = key("speed where the speed map is white", 4.0, "pixels of the output per frame", gt=0, le=100)
     width: int = key("width of the output; the picture is scaled to it", 640, "pixels", ge=64, le=4096)
     carried: Share01 = key("how much of the photograph itself is carried along the motion; 0: the paper's blurred "
@@ -64,13 +64,31 @@ class Assignment(Table):
         return Settings(**self.model_dump(exclude={"piece"}))
 
 
+OfTarget = Literal["target", "strokes", "matte", "orientation", "speed", "motion", "database", "result"]
+OfPiece = Literal["clip", "piece", "flow", "mean-motion", "significant-motion", "average", "difference", "spectrum",
+                  "textureness"]
+OfPair = Literal["neighbours", "neighbour-pieces", "neighbour-differences", "blended-plainly", "blended-by-bands",
+                 "deviation"]
+PanelName = OfTarget | OfPiece | OfPair
+ClipPiece = Annotated[tuple[Annotated[int, Field(ge=1, le=300)], Share01, Share01], Strict(False)]
+ScenePlace = Annotated[tuple[Share01, Share01], Strict(False)]
+
+
 class Figure(FigureTable):
     """The panels of X.png and X.mp4. With moments, the still shows the result once for each of them."""
 
-    panels: Annotated[tuple[Literal["target", "matte", "motion", "result"], ...], Strict(False)] = key(
-        "panels from left to right", ("target", "result"), min_length=1)
+    panels: Annotated[tuple[PanelName, ...], Strict(False)] = key(
+        "panels from left to right; those that show a piece stand once for each of figure.pieces, in turn, as far as "
+        "they follow each other", ("target", "result"), min_length=1)
     moments: Annotated[tuple[Annotated[int, Field(ge=1, le=100000)], ...], Strict(False)] = key(
         "frames at which the still shows the result; none: figure.frame alone", (), "frames", max_length=16)
+
+    pieces: Annotated[tuple[ClipPiece, ...], Strict(False)] = key(
+        "pieces of clips whose processing is shown (figures 5 to 7), each [clip, x, y]: the number of its clip, and "
+        "its middle, from the upper left corner", (), "widths and heights of the clip", max_length=8)
+    place: ScenePlace = key(
+        "x and y from the upper left corner: the two neighbours beside each other nearest to it are shown (figure 9)",
+        (0.5, 0.5), "widths and heights of the picture")
 
     def shown(self, frames: int) -> list[int]:
         return sorted({*super().shown(frames), *self.moments})

@@ -43,9 +43,7 @@ def read_target(scene: PhotoScene) -> Any:
     if frozen is not None and not ((_scaled(scene, matte[..., None])[..., 0] >= FULL) & ~frozen).any():
         raise BadInput(scene.photo.frozen or "", "photo.frozen", "covers all of the matte")
     background = _background(scene, shape, small, _scaled(scene, matte[..., None])[..., 0])
-    speed = None if photo.speed is None else np.float32(photo.fastest) * _scaled(
-        scene, _mask(scene, photo.speed, "photo.speed", shape)[..., None])[..., 0]
-    wanted = Wanted(_orientation(scene, shape, frozen), speed)
+    wanted = Wanted(_orientation(scene, shape, frozen), _speed(scene, small.shape))
     return Target(small, _scaled(scene, matte[..., None])[..., 0], background, frozen, wanted)
 
 
@@ -82,25 +80,57 @@ def _scaled(scene: PhotoScene, picture: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.clip(resized, 0, 1)[::-1], np.float32)
 
 
-def _orientation(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray | None) -> np.ndarray | None:
-    """The orientation map of the strokes, which are in pixels of the file from its upper left."""
-    from synth.photo.guides import orientation
-
-    photo = scene.photo
-    if not photo.strokes:
+def _speed(scene: PhotoScene, shape: tuple[int, ...]) -> np.ndarray | None:
+    """The user's speed map at the scene's size (Y, X), lowest row first, pixels per frame: a map of any size with the
+    picture's proportions, so that one that was written at another photo.width is taken too."""
+    file, (rows, columns) = scene.photo.speed, shape[:2]
+    if file is None:
         return None
+    grey = pictures.read_foreign(file, "photo.speed") @ pictures.LUMA
+    height, width = grey.shape
+    # either size may be rounded
+    if abs(height * columns - width * rows) > max(width, columns):
+        raise BadInput(file, "photo.speed", f"has {width} x {height} pixels: other proportions than the picture, "
+                                            f"whose output has {columns} x {rows}")
+    if grey.shape != (rows, columns):
+        grey = pictures.resized(grey[..., None], columns, rows)[..., 0]
+    return np.ascontiguousarray(scene.photo.fastest * np.clip(grey, 0, 1)[::-1], np.float32)
+
+
+def read_strokes(scene: PhotoScene) -> list[np.ndarray]:
+    """The strokes, each (K, 2) float64: x, y in pixels of the output, whose lowest left pixel is 0, 0."""
+    return _placed(scene, pictures.read_foreign(scene.photo.file, "photo.file").shape[:2])
+
+
+def _placed(scene: PhotoScene, shape: tuple[int, ...]) -> list[np.ndarray]:
+    """The strokes of `read_strokes`, of a picture that has `shape` (h, w) in its file.
+
+    Raises InvalidValue for one that leaves the picture or has no length.
+    """
+    photo = scene.photo
     scale = photo.width / shape[1]
     height = max(1, round(shape[0] * scale))
     strokes = []
     for number, stroke in enumerate(photo.strokes):
         points = np.array(stroke, np.float64)
-        if ((points < -0.5) | (points > np.array(shape[::-1]) - 0.5)).any():
+        if ((points < -0.5) | (points > np.array(shape[1::-1]) - 0.5)).any():
             raise InvalidValue(f"photo.strokes[{number}]", f"leaves the picture of {shape[1]} x {shape[0]} pixels")
         if not np.ptp(points, axis=0).any():
             raise InvalidValue(f"photo.strokes[{number}]", "has no length")
         placed = (points + 0.5) * scale - 0.5
         strokes.append(np.stack([placed[:, 0], height - 1 - placed[:, 1]], axis=-1))
-    return orientation(strokes, (height, photo.width), frozen)
+    return strokes
+
+
+def _orientation(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray | None) -> np.ndarray | None:
+    """The orientation map of the strokes."""
+    from synth.photo.guides import orientation
+
+    strokes = _placed(scene, shape)
+    if not strokes:
+        return None
+    height = max(1, round(shape[0] * scene.photo.width / shape[1]))
+    return orientation(strokes, (height, scene.photo.width), frozen)
 
 
 def check_target(scene: PhotoScene) -> None:
