@@ -76,16 +76,16 @@ def plot(curves: Sequence[Curve], x_label: str, y_label: str, width: int, top: f
 
 def _draw(page: np.ndarray, x: np.ndarray, y: np.ndarray, width: float, colour: Colour) -> None:
     """A line of `width` pixels through points x, y, pixels from the upper left corner, onto a page."""
+    cover = np.zeros(page.shape[:2], np.float32)
     for (x0, y0), (x1, y1) in itertools.pairwise(zip(x.tolist(), y.tolist(), strict=True)):
-        low, high = (max(0, int(min(x0, x1) - width - 1)), int(max(x0, x1) + width + 2))
-        part = page[:, low:high]
+        low, high = max(0, int(min(x0, x1) - width - 1)), int(max(x0, x1) + width + 2)
+        part = cover[:, low:high]
         rows, columns = np.mgrid[:part.shape[0], low:low + part.shape[1]] + 0.5
         step = max((x1 - x0) ** 2 + (y1 - y0) ** 2, 1e-12)
         share = np.clip(((columns - x0) * (x1 - x0) + (rows - y0) * (y1 - y0)) / step, 0, 1)
         away = np.hypot(columns - x0 - share * (x1 - x0), rows - y0 - share * (y1 - y0))
-        cover = np.clip(0.5 + width / 2 - away, 0, 1).astype(np.float32)[..., None]
-        # where two parts of a line overlap it is no darker
-        np.minimum(part, 1 - cover * (1 - np.array(colour, np.float32)), out=part)
+        np.maximum(part, np.clip(0.5 + width / 2 - away, 0, 1), out=part, casting="same_kind")
+    page += cover[..., None] * (np.array(colour, np.float32) - page)
 
 
 def _write(page: np.ndarray, text: np.ndarray, top: int, left: int, colour: Colour = (INK, INK, INK)) -> None:

@@ -41,7 +41,7 @@ def strength(values: np.ndarray, most: float, width: int) -> np.ndarray:
 
 def masked(values: np.ndarray, used: np.ndarray, width: int) -> np.ndarray:
     """A grey picture (Y, X) where `used` (Y, X) bool holds; the rest is plain."""
-    cover = np.clip(_resampled(used.astype(np.float32), width), 0, 1)[::-1, :, None]
+    cover = lic.resampled(used.astype(np.float32), lic.height_for(used.shape, width), width)[::-1, :, None]
     return (cover * grey(values, width) + (1 - cover) * np.array(UNUSED, np.float32)).astype(np.float32)
 
 

@@ -23,6 +23,8 @@ def test_a_table_photo_makes_it_a_scene_of_them(tmp_path: Path) -> None:
                                  "size"),
     ('["cloud"]', '["clouds"]', "clips.families: there is no family 'clouds', only fall, white-water, river, fire, "
                                 "smoke, cloud, bay, shallow, lake"),
+    ('["target"', '["piece"', 'figure.pieces: is empty, and the panel "piece" shows a piece'),
+    ("panel = 32", "panel = 32\npieces = [[2, 0.5, 0.5]]", "figure.pieces[0]: there is no clip 2, only 1"),
     ("panel = 32", "panel = 32\nmoments = [9]", "figure.moments[0]: the animation has 8 frames"),
     ("width = 96", "width = 20", "photo.width: should be greater than or equal to 64, not 20"),
     ("width = 96", "width = 96\ndynamics = 1.0", "photo.dynamics: should be less than 1, not 1.0"),
@@ -41,3 +43,10 @@ def test_the_readmes_example_is_a_whole_scene(tmp_path: Path) -> None:
     one = load(written(tmp_path, 'title = "A brook"\n' + "\n".join(example))).variants[""]
     assert len(one.photo.strokes) == 2
     assert len(one.clips.recipes()) == 65
+
+
+@pytest.mark.parametrize("panel", ["strokes", "orientation"])
+def test_panels_of_strokes_need_strokes(tmp_path: Path, panel: str) -> None:
+    text = changed(PHOTO, "strokes = [[[745, 340], [742, 376]], [[560, 600], [500, 640]]]\n", "")
+    assert complaint(written(tmp_path, changed(text, '["target"', f'["{panel}"'))) == (
+        f'photo.strokes: is empty, and the panel "{panel}" shows the strokes')
