@@ -29,19 +29,20 @@ class Curve(NamedTuple):
 
 
 def plot(curves: Sequence[Curve], x_label: str, y_label: str, width: int, top: float,
-         ) -> np.ndarray:
+         bottom: float = 0.0) -> np.ndarray:
     """Curves over axes from 0 to the greatest x and to `top`: display values (h, width, 3) float32 on white, 3 : 2.
 
-    The last curve is drawn above the others. What is higher than `top` is cut. Labels may hold *italics*. Raises
-    ValueError unless top > 0 and some x > 0.
+    bottom  where the y axis begins: at 0 it is linear, above it is logarithmic
+    The last curve is drawn above the others. What is beyond the axes is cut. Labels may hold *italics*. Raises
+    ValueError unless top > bottom >= 0 and some x > 0.
     """
     height = round(width * 2 / 3)
     right_end = max(float(curve.x.max()) for curve in curves)
-    if not (top > 0 and right_end > 0):
-        raise ValueError(f"axes go from 0 to more, not to {right_end:g} and {top:g}")
+    if not (top > bottom >= 0 and right_end > 0):
+        raise ValueError(f"axes go from less to more, not from 0 to {right_end:g} and from {bottom:g} to {top:g}")
     letter = max(LEGIBLE, round(width / 24))
     page = np.ones((height, width, 3), np.float32)
-    marks = {value: lettering(f"{value:g}", letter) for value in ticks(0.0, top)}
+    marks = {value: lettering(f"{value:g}", letter) for value in (_powers(bottom, top) if bottom else ticks(0.0, top))}
     line = len(lettering("0", letter))
     left = max(text.shape[1] for text in marks.values()) + letter
     inside = (line + letter // 2, height - 2 * line - letter // 2, left, width - letter)
@@ -49,7 +50,7 @@ def plot(curves: Sequence[Curve], x_label: str, y_label: str, width: int, top: f
     stroke = max(1, round(letter / 14))
     # axes and their numbers
     for value, text in marks.items():
-        row = round(lower - value / top * (lower - upper))
+        row = round(lower - float(_share(np.array(value), bottom, top)) * (lower - upper))
         page[row:row + stroke, first:last] = RULE
         _write(page, text, row - line // 2, first - letter // 2 - text.shape[1])
     for value in ticks(0.0, right_end):
@@ -65,13 +66,26 @@ def plot(curves: Sequence[Curve], x_label: str, y_label: str, width: int, top: f
     # curves
     for curve in curves:
         x = first + np.asarray(curve.x, np.float64) / right_end * (last - first)
-        y = lower - np.asarray(curve.y, np.float64) / top * (lower - upper)
+        y = lower - _share(np.asarray(curve.y, np.float64), bottom, top) * (lower - upper)
         _draw(page[upper:lower], x, y - upper, 2.2 * stroke, curve.colour)
     names = [curve for curve in curves if curve.name]
     for number, curve in enumerate(names):
         text = lettering(curve.name, letter)
         _write(page, text, upper + number * line, last - text.shape[1] - letter // 2, curve.colour)
     return page
+
+
+def _share(values: np.ndarray, bottom: float, top: float) -> np.ndarray:
+    """Where values lie between the ends of the y axis, 0..1."""
+    if bottom == 0:
+        return values / top
+    return np.asarray(np.log(np.maximum(values, bottom * 1e-3) / bottom) / np.log(top / bottom))
+
+
+def _powers(bottom: float, top: float) -> list[float]:
+    """The powers of ten from `bottom` to `top`."""
+    first, last = np.ceil(np.log10(bottom) - 1e-9), np.floor(np.log10(top) + 1e-9)
+    return [float(10.0**n) for n in np.arange(first, last + 1)]
 
 
 def _draw(page: np.ndarray, x: np.ndarray, y: np.ndarray, width: float, colour: Colour) -> None:

@@ -99,8 +99,12 @@ def make_spectrum(scene: PhotoScene, inputs: Inputs, frames: list[int], number: 
     spectra = [inputs.read(f"piece-{k}")["spectrum"] for k in range(1, len(scene.figure.pieces) + 1)]
     curves = [plot.Curve(np.arange(len(values)), values, plot.PALE) for values in spectra]
     curves.append(curves.pop(number - 1)._replace(colour=plot.BLUE))
-    top = 1.05 * max(float(values.max()) for values in spectra)
-    yield 0, tonemap.from_srgb(plot.plot(curves, "cycles in the clip", "pixels per frame", scene.figure.panel, top))
+    # whole powers of ten round all values but exact zeros
+    ends = [values[values > 0] for values in spectra]
+    bottom = 10.0 ** np.floor(np.log10(min(float(values.min()) for values in ends)))
+    top = 10.0 ** np.ceil(np.log10(max(float(values.max()) for values in ends)))
+    yield 0, tonemap.from_srgb(plot.plot(curves, "cycles in the clip", "pixels per frame", plot_width(scene), top,
+                                         bottom))
 
 
 def make_textureness(scene: PhotoScene, inputs: Inputs, frames: list[int], number: int, level: int) -> Pictures:
@@ -110,6 +114,11 @@ def make_textureness(scene: PhotoScene, inputs: Inputs, frames: list[int], numbe
     most = max(float(inputs.read(f"piece-{k}")["texture"].max()) for k in range(1, len(scene.figure.pieces) + 1))
     yield 0, tonemap.from_srgb(steps.strength(inputs.read(f"piece-{number}")["texture"][..., level], most,
                                               scene.figure.panel))
+
+
+def plot_width(scene: PhotoScene) -> int:
+    """Width of a plot as high as a square panel."""
+    return round(scene.figure.panel * 3 / 2)
 
 
 LOOKS: dict[str, tuple[Callable[..., Pictures], str]] = {
@@ -137,7 +146,7 @@ def piece_views(scene: PhotoScene, name: str, number: int) -> list[View]:
     reads = ("figure.panel", "figure.pieces")
     if name == "spectrum":
         return [View(picture(f"spectrum-{number}", reads, every, make_spectrum, number=number),
-                     "amplitude of the motion", full, border=False)]
+                     "amplitude of the motion", plot_width(scene), border=False)]
     if name == "textureness":
         return [View(picture(f"textureness-{number}-{level}", reads, every, make_textureness, number=number,
                              level=level), f"*T*, σ {scale}", full) for level, scale in enumerate(SCALES)]

@@ -104,5 +104,5 @@ def target_view(scene: PhotoScene, name: str) -> View:
         case "database":
             clips = names(scene, "clip")
             return View(picture(name, ("photo", "figure.panel"), tuple(clips), make_database, clips=clips),
-                        f"database, {len(clips)} clips", full, border=False)
+                        f"database, {len(clips)} clip{'s' * (len(clips) > 1)}", full, border=False)
     raise ValueError(f"there is no view {name!r}")

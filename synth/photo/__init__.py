@@ -31,6 +31,7 @@ Then the database (§4), the assignment (§5) and the synthesis (§6):
     photograph  the photograph carried along the motion (beyond the paper)
     boundary    the matte that moves with fire and smoke (fig. 10), what is seen behind it
     animate     the whole, from target to frames
+    steps       inner steps, as figures show them (figs. 5 to 7, 9)
 
 Notation:
 

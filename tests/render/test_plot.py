@@ -39,7 +39,16 @@ def test_names_are_written_in_the_colour_of_their_curve():
     assert (named[written][:, 0] - named[written][:, 2]).mean() > 0.2
 
 
+def test_equal_factors_are_equal_steps_of_a_logarithmic_axis():
+    x = np.arange(11.0)
+    heights = [rows_of(plot([Curve(x, np.full(11, y), BLUE)], "x", "y", 300, 10.0, 0.001), BLUE, 200).mean()
+               for y in (0.01, 0.1, 1)]
+    assert heights[0] - heights[1] == pytest.approx(heights[1] - heights[2], abs=1)
+    assert heights[0] - heights[1] > 20
+    assert len(rows_of(plot([Curve(x, np.zeros(11), BLUE)], "x", "y", 300, 10.0, 0.001), BLUE, 200)) == 0
+
+
 @pytest.mark.parametrize(("x", "top"), [(np.zeros(3), 1.0), (np.arange(3.0), 0.0)])
 def test_axes_without_a_length_are_refused(x, top):
-    with pytest.raises(ValueError, match="axes go from 0"):
+    with pytest.raises(ValueError, match="axes go from less to more"):
         plot([Curve(x, np.zeros(3), BLUE)], "x", "y", 300, top)

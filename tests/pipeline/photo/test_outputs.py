@@ -14,7 +14,8 @@ from pipeline.photo.outputs import read_motion, speed_map, write_motion
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> BuildGraph:
-    return tiny.made(tmp_path_factory.mktemp("photo"), changed(PHOTO, "width = 96", "width = 96\nfastest = 2.0"), "synth")
+    text = changed(PHOTO, "width = 96", "width = 96\nfastest = 2.0")
+    return tiny.made(tmp_path_factory.mktemp("photo"), text, "synth")
 
 
 def test_the_motion_is_in_channels_x_and_y_top_row_first(made: BuildGraph) -> None:

@@ -112,8 +112,8 @@ def test_a_speed_map_of_any_size_with_the_pictures_proportions_is_taken(tmp_path
 
 
 def test_a_speed_map_of_other_proportions_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"s\.png: photo\.speed: has 100 x 60 pixels: other proportions than the picture, "
-                                       "whose output has 96 x 48"):
+    with pytest.raises(BadInput, match=r"s\.png: photo\.speed: has 100 x 60 pixels: other proportions than the "
+                                       "picture, whose output has 96 x 48"):
         check_target(with_speed(tmp_path, (60, 100)))
 
 
