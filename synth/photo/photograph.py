@@ -189,12 +189,15 @@ def frames(picture: np.ndarray, motion: np.ndarray, length: int, seed: int, feat
     where = opencl.to_device(paths(moves, int(np.ceil(lived[0]))))
     turn, place = turns(motion.shape[:2], seed), places(moves, lived, feature)
     detail = opencl.to_device(np.pad(of.detail, ((0, 0), (0, 0), (0, 1))))
-    own = [opencl.to_device(values) for values in (turn, place, lived)]
-    scale = _restored(of, [carried(detail, where, *own, length * k // SAMPLES, OWN * feature) for k in range(SAMPLES)],
-                      feature)[..., None]
+    turn, place, lived = (opencl.to_device(values) for values in (turn, place, lived))
+
+    def at(frame: int) -> np.ndarray:
+        return carried(detail, where, turn, place, lived, frame, OWN * feature)
+
+    scale = _restored(of, [at(length * k // SAMPLES) for k in range(SAMPLES)], feature)[..., None]
     # 3. frames
     for frame in range(length):
-        shown = of.ground + scale * carried(detail, where, *own, frame, OWN * feature)
+        shown = of.ground + scale * at(frame)
         yield shown if held is None else np.where(held[..., None], picture, shown)
 
 
