@@ -120,8 +120,8 @@ def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, s
     fluid = extended(target.picture, target.matte)
     # 1. ground
     still = average(fluid, moves) if look.carried < 1 else fluid
-    moving = (photograph.frames(fluid, moves, length, seed, look.feature, target.frozen) if look.carried > 0
-              else repeat(still, length))
+    moving = (photograph.frames(fluid, moves, length, seed, look.feature, target.fluid > 0.5)
+              if look.carried > 0 else repeat(still, length))
     grey = fluid.mean(axis=2)
     strength = look.strength * (1 - look.carried * (1 - CALMED))
     # 2. differences

@@ -6,9 +6,10 @@ ripples, moves instead of being averaged away, and what stands in it stays: the 
     frame    ground + strength × carried detail
 
 Carried for long, detail is torn, and comes where it does not belong. So two copies are carried, half a life apart;
-each begins where it lies in the photograph and has no weight when it begins and when it ends. A life ends where the
-motion has led it as far as a feature is large: lives of different places have different lengths, each a whole part of
-the loop, and begin at different times, a smooth noise apart. So nothing pulses, and the loop closes.
+each begins near where it lies in the photograph and has no weight when it begins and when it ends. A life ends where
+the motion has led it as far as a feature is large: lives of different places have different lengths, each a whole part
+of the loop, and begin at different times, a smooth noise apart. Each begins somewhere else, a feature or so away. So
+nothing pulses, nothing repeats before the loop does, and the loop closes.
 
 Squares of the weights add up to one; copies that come from nearly the same place are not counted twice.
 
@@ -18,6 +19,7 @@ Hot: `carried`, 16 pixels for each of up to four copies of each pixel of each fr
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -50,6 +52,8 @@ SAMPLES = 4
 """Frames whose power is measured."""
 LOST = 1.6
 """The most that lost power is made up for."""
+AWAY = 1.5
+"""How far from its place detail may begin, in sizes of a feature."""
 OWN = 0.2
 """How far apart two places of detail are unlike, in sizes of a feature."""
 ROW = 64
@@ -64,18 +68,31 @@ class Split(NamedTuple):
     strength: np.ndarray
 
 
-def split(picture: np.ndarray, motion: np.ndarray, feature: float, held: np.ndarray | None = None) -> Split:
+def split(picture: np.ndarray, motion: np.ndarray, feature: float, fluid: np.ndarray) -> Split:
     """What stands of a picture (Y, X, C) float32 that flows by motion (Y, X, 2), and what moves.
 
     feature  size of what moves, as streaks, ripples and billows, pixels
-    held     (Y, X) bool: what stands still: nothing of it moves, and nothing is averaged with it
+    fluid    (Y, X) bool: where the fluid is. Nothing else is averaged with it; detail goes on beyond it, mirrored
     """
-    free = np.ones(picture.shape[:2], np.float32) if held is None else (~held).astype(np.float32)
+    free = fluid.astype(np.float32)
     ground = standing(picture, motion, feature, free)
     detail = (picture - ground) * free[..., None]
     squares = (detail.mean(axis=2, dtype=np.float64) ** 2).astype(np.float32)
     strength = np.sqrt(np.maximum(_smooth(squares[..., None], STRENGTH * feature, free)[..., 0], 0)) + FAINT
-    return Split(ground, np.clip(detail / strength[..., None], -MOST, MOST).astype(np.float32), strength)
+    unit = np.clip(detail / strength[..., None], -MOST, MOST).astype(np.float32)
+    return Split(ground, unit[mirrored(fluid)], strength)
+
+
+def mirrored(fluid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where each pixel is read: itself in the fluid (Y, X) bool, beyond it what lies as far on the fluid's side of the
+    shore: rows and columns (Y, X) int."""
+    rows, columns = np.mgrid[:fluid.shape[0], :fluid.shape[1]]
+    if not fluid.any():
+        return rows, columns
+    y, x = ndimage.distance_transform_edt(~fluid, return_distances=False, return_indices=True)
+    behind = np.clip(2 * y - rows, 0, fluid.shape[0] - 1), np.clip(2 * x - columns, 0, fluid.shape[1] - 1)
+    inside = fluid[behind]
+    return np.asarray(np.where(inside, behind[0], y)), np.asarray(np.where(inside, behind[1], x))
 
 
 def standing(picture: np.ndarray, motion: np.ndarray, feature: float, free: np.ndarray) -> np.ndarray:
@@ -123,12 +140,11 @@ def lives(length: int) -> np.ndarray:
     return (length / times).astype(np.float32)
 
 
-def places(motion: np.ndarray, lived: np.ndarray, feature: float) -> np.ndarray:
+def places(speed: np.ndarray, lived: np.ndarray, feature: float) -> np.ndarray:
     """Which of the lives (K,) each pixel has, as a number 0 … K - 1 and between: (Y, X) float32.
 
-    The life in which the motion (Y, X, 2) passes a feature.
+    The life in which the motion, of a speed (Y, X), passes a feature.
     """
-    speed = ndimage.gaussian_filter(np.hypot(motion[..., 0], motion[..., 1]), STRENGTH * feature, mode="nearest")
     wanted = feature / np.maximum(speed, 1e-3)
     return np.interp(np.log(wanted), np.log(lived[::-1]), np.arange(len(lived))[::-1]).astype(np.float32)
 
@@ -170,35 +186,45 @@ def turns(shape: tuple[int, int], seed: int) -> np.ndarray:
     return (turn % 1).astype(np.float32) % np.float32(1)
 
 
-def frames(picture: np.ndarray, motion: np.ndarray, length: int, seed: int, feature: float,
-           held: np.ndarray | None = None) -> Iterator[np.ndarray]:
+def starts(lived: np.ndarray, length: int, seed: int) -> np.ndarray:
+    """Where to, from its place, detail begins: (K, 2, N, 2) float32, of each of the lives (K,), of both copies and of
+    each of its lives in a loop of `length` frames. A sunflower's seeds in a circle of radius 1, turned at random."""
+    times = np.rint(length / lived)
+    number = np.arange(times.max())
+    random = np.random.Generator(np.random.Philox(key=[seed, 2]))
+    angle = number * np.pi * (3 - np.sqrt(5)) + 2 * np.pi * random.random((len(lived), 2, 1))
+    away = np.sqrt(np.minimum((number + 0.5) / times[:, None, None], 1))
+    return np.stack([away * np.cos(angle), away * np.sin(angle)], axis=-1).astype(np.float32)
+
+
+def frames(picture: np.ndarray, motion: np.ndarray, length: int, seed: int, feature: float, fluid: np.ndarray,
+           ) -> Iterator[np.ndarray]:
     """The `length` frames of a picture (Y, X, 3) float32 carried along motion (Y, X, 2), a loop: (Y, X, 3) float32.
 
     feature  size of what moves, as streaks, ripples and billows, pixels: what is larger stands
-    held     (Y, X) bool: what stands still. It is shown as it is, and no path leads through it
+    fluid    (Y, X) bool: where the fluid is. The rest is shown as it is, and nothing is read from it
 
     1. What stands and what moves.
-    2. Where each pixel was, how long it lives, and when its life begins.
+    2. Where each pixel was; when its life begins, how long it is, where detail begins.
     3. Frame by frame the carried detail, on what stands.
     """
     # 1. split
-    of = split(picture, motion, feature, held)
+    of = split(picture, motion, feature, fluid)
     # 2. paths and lives
-    moves = motion if held is None else np.where(held[..., None], np.float32(0), motion)
     lived = lives(length)
-    where = opencl.to_device(paths(moves, int(np.ceil(lived[0]))))
-    turn, place = turns(motion.shape[:2], seed), places(moves, lived, feature)
-    detail = opencl.to_device(np.pad(of.detail, ((0, 0), (0, 0), (0, 1))))
-    turn, place, lived = (opencl.to_device(values) for values in (turn, place, lived))
-
-    def at(frame: int) -> np.ndarray:
-        return carried(detail, where, turn, place, lived, frame, OWN * feature)
-
-    scale = _restored(of, [at(length * k // SAMPLES) for k in range(SAMPLES)], feature)[..., None]
+    speed = ndimage.gaussian_filter(np.hypot(motion[..., 0], motion[..., 1]), STRENGTH * feature, mode="nearest")
+    place = places(speed, lived, feature)
+    # what stands begins where it is
+    far = AWAY * np.minimum(speed * np.interp(place, np.arange(len(lived)), lived), feature)
+    carry = Carrying(
+        np.pad(of.detail, ((0, 0), (0, 0), (0, 1))), paths(motion, int(np.ceil(lived[0]))),
+        np.stack([turns(motion.shape[:2], seed), place, far, np.zeros_like(far)], axis=-1).astype(np.float32),
+        lived, starts(lived, length, seed), length, OWN * feature)
+    device = carry.on_device()
+    scale = _restored(of, [carried(device, length * k // SAMPLES) for k in range(SAMPLES)], feature)[..., None]
     # 3. frames
     for frame in range(length):
-        shown = of.ground + scale * at(frame)
-        yield shown if held is None else np.where(held[..., None], picture, shown)
+        yield np.where(fluid[..., None], of.ground + scale * carried(device, frame), picture)
 
 
 def _restored(of: Split, moved: list[np.ndarray], feature: float) -> np.ndarray:
@@ -211,45 +237,67 @@ def _restored(of: Split, moved: list[np.ndarray], feature: float) -> np.ndarray:
     return of.strength * np.clip(np.sqrt(before / np.maximum(after, 1e-12)), 1, LOST).astype(np.float32)
 
 
-def carried(detail: Any, where: Any, turn: Any, place: Any, lived: Any, frame: int, own: float) -> np.ndarray:
-    """One frame of carried detail: (Y, X, 3) float32. All arrays are float32 on the device.
+@dataclass(frozen=True, eq=False)
+class Carrying:
+    """What a carried frame is made of, float32, here or on the device.
 
     detail  (Y, X, 4), the last 0
-    where   (ages, Y, X, 2), as `paths`; one age more than the longest life
-    turn    (Y, X), as `turns`
-    place   (Y, X), as `places`
+    where   (ages, Y, X, 2), as `paths`: one age more than the longest life
+    pixels  (Y, X, 4): as `turns`, as `places`, how far from its place detail begins, 0
     lived   (K,), as `lives`
+    starts  (K, 2, N, 2), as `starts`
+    length  frames of the loop
     own     pixels over which detail is like itself
     """
-    height, width = detail.shape[:2]
+
+    detail: Any
+    where: Any
+    pixels: Any
+    lived: Any
+    starts: Any
+    length: int
+    own: float
+
+    def on_device(self) -> Carrying:
+        """The same on the device."""
+        return Carrying(opencl.to_device(self.detail), opencl.to_device(self.where), opencl.to_device(self.pixels),
+                        opencl.to_device(self.lived), opencl.to_device(self.starts), self.length, self.own)
+
+
+def carried(of: Carrying, frame: int) -> np.ndarray:
+    """One frame of carried detail: (Y, X, 3) float32. `of` is on the device."""
+    height, width = of.detail.shape[:2]
     out = opencl.empty((height, width, 4))
-    program = opencl.program(Path(__file__).with_suffix(".cl"), LIVES=lived.shape[0])
-    program.carried((-(-width // ROW) * ROW, height), (ROW, 1), detail, where, turn, place, lived, out,
-                    np.float32(frame), np.float32(own), np.int32(width), np.int32(height))
+    program = opencl.program(Path(__file__).with_suffix(".cl"), LIVES=of.lived.shape[0], STARTS=of.starts.shape[2])
+    program.carried((-(-width // ROW) * ROW, height), (ROW, 1), of.detail, of.where, of.pixels, of.lived, of.starts,
+                    out, np.float32(frame), np.float32(of.length), np.float32(of.own), np.int32(width), np.int32(height))
     return np.ascontiguousarray(out.get()[..., :3])
 
 
-def carried_reference(detail: np.ndarray, where: np.ndarray, turn: np.ndarray, place: np.ndarray, lived: np.ndarray,
-                      frame: int, own: float) -> np.ndarray:
+def carried_reference(of: Carrying, frame: int) -> np.ndarray:
     """`carried` in NumPy: its specification."""
-    rows, columns = np.mgrid[:detail.shape[0], :detail.shape[1]]
-    longer = np.minimum(place.astype(int), len(lived) - 2)
+    rows, columns = np.mgrid[:of.detail.shape[0], :of.detail.shape[1]]
+    turn, place, far = (of.pixels[..., k] for k in range(3))
+    longer = np.minimum(place.astype(int), len(of.lived) - 2)
     part = place - longer
-    total, copies = np.zeros_like(detail), []
+    total, copies = np.zeros_like(of.detail), []
     for c in range(4):
-        life = lived[longer + c // 2]
-        age = (turn + np.float32(frame) / life + np.float32(0.5 * (c % 2))) % np.float32(1)
+        life = of.lived[longer + c // 2]
+        age = turn + np.float32(frame) / life + np.float32(0.5 * (c % 2))
+        number = age.astype(int) % np.rint(of.length / life).astype(int)
+        age = age % np.float32(1)
         low = (age * life).astype(int)
         t = (age * life - low)[..., None]
-        at = (1 - t) * where[low, rows, columns] + t * where[low + 1, rows, columns]
+        at = (1 - t) * of.where[low, rows, columns] + t * of.where[low + 1, rows, columns]
+        at = at + far[..., None] * of.starts[longer + c // 2, c % 2, number]
         rise = 1 - np.abs(2 * age - 1)
         weight = np.sqrt((1 - part if c < 2 else part) * rise * rise * (3 - 2 * rise))
-        total += weight[..., None] * _between(detail, at)
+        total += weight[..., None] * _between(of.detail, at)
         copies.append((at, weight))
     power = np.zeros(turn.shape, np.float32)
     for at, weight in copies:
         for other, also in copies:
-            apart = ((at - other) / np.float32(own)).astype(np.float32)
+            apart = ((at - other) / np.float32(of.own)).astype(np.float32)
             power += weight * also / (1 + (apart * apart).sum(axis=2)) ** 2
     return (total / np.sqrt(power)[..., None])[..., :3]
 

@@ -4,26 +4,28 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from synth import opencl
 from synth.photo.photograph import (
     HALVINGS,
     LIFE,
     OWN,
+    Carrying,
     carried,
     carried_reference,
     frames,
     lives,
+    mirrored,
     paths,
     places,
     split,
+    starts,
     turns,
 )
 
 SHAPE = (72, 96)
 
 
-def moving(of, motion, length, seed, feature=10.0, held=None):
-    return np.stack(list(frames(of, motion, length, seed, feature, held)))
+def moving(of, motion, length, seed, feature=10.0, fluid=None):
+    return np.stack(list(frames(of, motion, length, seed, feature, np.ones(SHAPE, bool) if fluid is None else fluid)))
 
 
 def picture(seed=1, sigma=1.5):
@@ -47,9 +49,9 @@ def test_a_loop_holds_whole_lives(length):
 
 def test_a_life_ends_where_the_motion_has_passed_a_feature():
     lived = lives(96)
-    assert places(uniform(0.1, 0), lived, 10).max() == 0
-    assert places(uniform(30, 0), lived, 10).min() == len(lived) - 1
-    at = places(uniform(10 / 12, 0), lived, 10)[36, 48]
+    assert places(np.full(SHAPE, 0.1), lived, 10).max() == 0
+    assert places(np.full(SHAPE, 30.0), lived, 10).min() == len(lived) - 1
+    at = places(np.full(SHAPE, 10 / 12), lived, 10)[36, 48]
     assert np.interp(at, np.arange(len(lived)), lived) == pytest.approx(12, abs=0.5)
 
 
@@ -80,7 +82,7 @@ def test_all_ages_are_alike_and_neighbours_are_near():
 
 
 def test_ground_and_detail_are_the_picture():
-    of = split(picture(), uniform(2, 1), 10)
+    of = split(picture(), uniform(2, 1), 10, np.ones(SHAPE, bool))
     whole = of.ground + of.strength[..., None] * of.detail
     assert np.quantile(np.abs(whole - picture()), 0.98) < 0.02
 
@@ -91,7 +93,7 @@ def test_an_edge_across_the_motion_stays_sharp_and_grain_does_not():
     edge = np.where(x < 48, 0.2, 0.7).astype(np.float32)
     grain = 0.04 * np.random.Generator(np.random.Philox(2)).standard_normal(SHAPE)
     shown = np.repeat((edge + grain)[..., None], 3, axis=2).astype(np.float32)
-    ground = split(shown, uniform(2, 0), 10).ground[..., 0]
+    ground = split(shown, uniform(2, 0), 10, np.ones(SHAPE, bool)).ground[..., 0]
     assert ground[:, 51].mean() - ground[:, 44].mean() > 0.9 * 0.5
     assert ground[8:-8, 60:88].std() < 0.25 * 0.04
 
@@ -128,14 +130,31 @@ def test_the_loop_closes():
     np.testing.assert_array_equal(shown[0], moving(picture(), uniform(2, 1), 60, 1)[0])
 
 
-def test_what_is_held_stands_still_and_nothing_is_read_from_it():
+def test_what_is_no_fluid_stands_still_and_nothing_is_read_from_it():
     held = np.zeros(SHAPE, bool)
     held[:, 40:52] = True
     marked = picture()
     marked[held] = [9.0, 0.0, 0.0]
-    shown = moving(marked, uniform(2, 0), 40, 1, held=held)
+    shown = moving(marked, uniform(2, 0), 40, 1, fluid=~held)
     np.testing.assert_array_equal(shown[:, held], np.broadcast_to([9.0, 0.0, 0.0], shown[:, held].shape))
-    assert shown[:, :, 54:, 0].max() < 3
+    assert shown[:, ~held, 0].max() < 2
+
+
+def test_beyond_the_fluid_it_is_mirrored():
+    fluid = np.zeros((3, 10), bool)
+    fluid[:, 2:7] = True
+    rows, columns = mirrored(fluid)
+    assert columns[1].tolist() == [4, 3, 2, 3, 4, 5, 6, 5, 4, 3]
+    assert (rows == np.arange(3)[:, None]).all()
+
+
+def test_nothing_repeats_before_the_loop_does():
+    """The correlation of a frame with another is nowhere as high as with its neighbours."""
+    shown = moving(picture(), uniform(2, 1), 96, 1)
+    flat = (shown - shown.mean(axis=0))[:, 12:-12, 12:-12].reshape(96, -1)
+    flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+    found = flat[:1] @ flat.T
+    assert found[0, 6:91].max() < 0.3
 
 
 @pytest.mark.parametrize("shape", [(5, 7), (2, 2), (33, 65)])
@@ -143,9 +162,11 @@ def test_the_kernel_is_its_specification(shape):
     random = np.random.Generator(np.random.Philox(7))
     motion = random.normal(0, 2, (*shape, 2)).astype(np.float32)
     lived = lives(50)
-    detail = np.pad(random.standard_normal((*shape, 3)), ((0, 0), (0, 0), (0, 1))).astype(np.float32)
-    given = (detail, paths(motion, int(np.ceil(lived[0]))), random.random(shape, np.float32),
-             random.uniform(0, len(lived) - 1, shape).astype(np.float32), lived)
+    of = Carrying(
+        np.pad(random.standard_normal((*shape, 3)), ((0, 0), (0, 0), (0, 1))).astype(np.float32),
+        paths(motion, int(np.ceil(lived[0]))),
+        np.stack([random.random(shape), random.uniform(0, len(lived) - 1, shape), random.uniform(0, 9, shape),
+                  np.zeros(shape)], axis=-1).astype(np.float32),
+        lived, starts(lived, 50, 3), 50, 10 * OWN)
     for frame in (0, 17, 49):
-        ours = carried(*(opencl.to_device(values) for values in given), frame, 10 * OWN)
-        np.testing.assert_allclose(ours, carried_reference(*given, frame, np.float32(10 * OWN)), atol=2e-4)
+        np.testing.assert_allclose(carried(of.on_device(), frame), carried_reference(of, frame), atol=2e-4)
