@@ -270,7 +270,8 @@ def carried(of: Carrying, frame: int) -> np.ndarray:
     out = opencl.empty((height, width, 4))
     program = opencl.program(Path(__file__).with_suffix(".cl"), LIVES=of.lived.shape[0], STARTS=of.starts.shape[2])
     program.carried((-(-width // ROW) * ROW, height), (ROW, 1), of.detail, of.where, of.pixels, of.lived, of.starts,
-                    out, np.float32(frame), np.float32(of.length), np.float32(of.own), np.int32(width), np.int32(height))
+                    out, np.float32(frame), np.float32(of.length), np.float32(of.own), np.int32(width),
+                    np.int32(height))
     return np.ascontiguousarray(out.get()[..., :3])
 
 
