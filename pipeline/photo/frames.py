@@ -67,7 +67,8 @@ def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list
     part = target.part(box)
     moved = of._replace(corner=of.corner - [box[0].start, box[1].start])
     rows, columns = part.matte.shape
-    more = differences(moved, shown, luma, (rows, columns), cut, scene.frames, scene.seed)
+    more = differences(moved, shown, luma, (rows, columns), cut, scene.frames, scene.seed,
+                       scene.photo.blending)
     look = Look(scene.photo.carried, scene.photo.feature, scene.photo.strength, scene.photo.matching)
     whole = target.picture.copy()
     for frame, picture in enumerate(composed(part, more, kept["motion"][box], look, scene.seed), start=1):
