@@ -28,6 +28,9 @@ class Photo(Table):
     strokes: Annotated[tuple[Stroke, ...], Strict(False)] = key(
         "strokes along the flow, from their first point to their last, each an array of points [x, y] of the file, "
         "from its upper left corner (§5, figure 8); none: the clips alone decide", (), max_length=1000)
+    speeds: Annotated[tuple[Annotated[float, Field(ge=0, le=100)], ...], Strict(False)] = key(
+        "a speed of each stroke, as many as strokes; none: the clips alone decide, or photo.speed", (),
+        "pixels of the output per frame", max_length=1000)
     speed: Asset | None = key("a grey picture of the same size, the speed map (§5, figure 8): black rests, white is "
                               "photo.fastest; none: the clips alone decide", None)
     fastest: float = key("speed where the speed map is white", 4.0, "pixels of the output per frame", gt=0, le=100)
