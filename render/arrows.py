@@ -16,7 +16,7 @@ INK: Colour = (0.10, 0.10, 0.10)
 
 HEAD = 0.42  # length of the head as a share of the arrow's
 WIDTH = 0.085  # of the shaft, as a share of the longest arrow's length
-HEAD_LENGTH, HEAD_WIDTH = 4.2, 4.0  # of an arrow along a stroke, over the width of its shaft
+HEAD_LENGTH, HEAD_WIDTH = 3.8, 3.6  # of an arrow along a stroke, over the width of its shaft
 
 
 def drawn(picture: np.ndarray, tails: np.ndarray, vectors: np.ndarray, length: float, colour: Colour,

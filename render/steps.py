@@ -74,7 +74,7 @@ def strokes(picture: np.ndarray, drawn: Sequence[np.ndarray], width: int) -> np.
     drawn  each (K, 2): x, y of its points in pixels of the picture, whose lowest left is 0, 0
     """
     scale = width / picture.shape[1]
-    return arrows.along(reduced(picture, width), [(stroke + 0.5) * scale for stroke in drawn], max(2.0, width / 150),
+    return arrows.along(reduced(picture, width), [(stroke + 0.5) * scale for stroke in drawn], max(2.0, width / 210),
                         arrows.ORANGE)
 
 

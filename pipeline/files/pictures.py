@@ -184,13 +184,14 @@ def _picture(stored: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
 
 
-def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The picture (h, w, C) resampled to (height, width, C) float32: Blackman-Harris up, Lanczos 3 down."""
+def resized(picture: np.ndarray, width: int, height: int, kernel: str = "") -> np.ndarray:
+    """The picture (h, w, C) resampled to (height, width, C) float32: Blackman-Harris up, Lanczos 3 down; or by one of
+    OpenImageIO's kernels, of which "triangle" does not overshoot."""
     import OpenImageIO as oiio
 
     source = oiio.ImageBuf(np.ascontiguousarray(picture, dtype=np.float32))
     region = oiio.ROI(0, width, 0, height, 0, 1, 0, picture.shape[2])
-    result = oiio.ImageBufAlgo.resize(source, "", 0.0, roi=region)
+    result = oiio.ImageBufAlgo.resize(source, kernel, 0.0, roi=region)
     if result.has_error:
         raise ValueError(f"cannot resize: {_first_line(result.geterror())}")
     return np.asarray(result.get_pixels("float")).reshape(height, width, -1)

@@ -60,7 +60,7 @@ def make_difference(scene: PhotoScene, inputs: Inputs, frames: list[int], side: 
 
 
 def make_blended(scene: PhotoScene, inputs: Inputs, frames: list[int], how: str) -> Pictures:
-    """The differences of both, blended "plain" or "banded"."""
+    """The differences of both, blended by "shares" or by "roots"."""
     from render import steps, tonemap
 
     yield 0, tonemap.from_srgb(steps.difference(inputs.read("neighbours")[how], scene.figure.panel))
@@ -70,11 +70,11 @@ def make_deviation(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Pict
     """The deviation over time of each column of both: what is lost between the pieces."""
     from render import plot, tonemap
 
-    plain, banded = inputs.read("neighbours")["deviation"]
-    at = np.arange(len(plain))
-    curves = [plot.Curve(at, plain, plot.RED, "plainly"), plot.Curve(at, banded, plot.BLUE, "by bands")]
+    shares, roots = inputs.read("neighbours")["deviation"]
+    at = np.arange(len(shares))
+    curves = [plot.Curve(at, shares, plot.RED, "weights add up to 1"), plot.Curve(at, roots, plot.BLUE, "squares do")]
     yield 0, tonemap.from_srgb(plot.plot(curves, "column, pixels", "grey levels", scene.figure.panel,
-                                         1.4 * float(max(plain.max(), banded.max()))))
+                                         1.4 * float(max(shares.max(), roots.max()))))
 
 
 def narrow(scene: PhotoScene) -> int:
@@ -105,10 +105,10 @@ def neighbour_views(scene: PhotoScene, name: str) -> list[View]:
         case "neighbour-differences":
             return [View(picture(f"difference-{side}", reads, of, make_difference, side=number), "its difference *D*",
                          narrow(scene)) for number, side in sides]
-        case "blended-plainly":
-            return [View(picture(name, reads, of, make_blended, how="plain"), "blended plainly", full)]
-        case "blended-by-bands":
-            return [View(picture(name, reads, of, make_blended, how="banded"), "blended by bands", full)]
+        case "shares":
+            return [View(picture(name, reads, of, make_blended, how=name), "blended, weights add up to 1", full)]
+        case "roots":
+            return [View(picture(name, reads, of, make_blended, how=name), "blended, their squares do", full)]
         case "deviation":
             return [View(picture(name, reads, of, make_deviation), "deviation over time", full, border=False)]
     raise ValueError(f"there is no view {name!r}")

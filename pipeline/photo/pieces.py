@@ -14,7 +14,6 @@ import numpy as np
 
 from pipeline.build.artifact import Artifact, Inputs
 from pipeline.files import arrays
-from pipeline.photo.clips import names
 from pipeline.photo.frames import cut_of
 from pipeline.photo.tables import OfPiece, PhotoScene
 from pipeline.photo.views import Pictures, View, picture
@@ -132,8 +131,7 @@ def piece_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """What is known of the pieces that the figure shows."""
     if not set(scene.figure.panels) & set(get_args(OfPiece)):
         return ()
-    clips = names(scene, "clip")
-    wanted = [(clips[clip - 1], [x, y]) for clip, x, y in scene.figure.pieces]
+    wanted = [(f"clip-{clip}", [x, y]) for clip, x, y in scene.figure.pieces]
     return tuple(Artifact(f"piece-{number}", "synth", arrays.ARRAYS, ("assignment.piece",), ((clip, "once"),),
                           make_piece, {"clip": clip, "place": place}, animated=False)
                  for number, (clip, place) in enumerate(wanted, start=1))

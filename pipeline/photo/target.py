@@ -23,7 +23,6 @@ def read_target(scene: PhotoScene) -> Any:
     Raises BadInput for a file that is no use, InvalidValue for strokes that are none.
     """
     from synth.photo.animate import Target
-    from synth.photo.assign import Wanted
 
     photo = scene.photo
     picture = pictures.read_foreign(photo.file, "photo.file")
@@ -43,7 +42,7 @@ def read_target(scene: PhotoScene) -> Any:
     if frozen is not None and not ((_scaled(scene, matte[..., None])[..., 0] >= FULL) & ~frozen).any():
         raise BadInput(scene.photo.frozen or "", "photo.frozen", "covers all of the matte")
     background = _background(scene, shape, small, _scaled(scene, matte[..., None])[..., 0])
-    wanted = Wanted(_orientation(scene, shape, frozen), _speed(scene, small.shape))
+    wanted = _wanted(scene, shape, frozen)
     return Target(small, _scaled(scene, matte[..., None])[..., 0], background, frozen, wanted)
 
 
@@ -73,17 +72,31 @@ def _mask(scene: PhotoScene, file: Path, at: str, shape: tuple[int, int]) -> np.
 
 def _scaled(scene: PhotoScene, picture: np.ndarray) -> np.ndarray:
     """A picture (h, w, C), top row first, at the scene's width, lowest row first: float32, 0..1."""
+    # beside the border of a mask an overshoot would be fluid
+    kernel = "triangle" if picture.shape[2] == 1 else ""
     width = scene.photo.width
     height = max(1, round(picture.shape[0] * width / picture.shape[1]))
     same = picture.shape[1] == width
-    resized = picture if same else pictures.resized(picture.astype(np.float32), width, height)
+    resized = picture if same else pictures.resized(picture.astype(np.float32), width, height, kernel)
     return np.ascontiguousarray(np.clip(resized, 0, 1)[::-1], np.float32)
 
 
-def _speed(scene: PhotoScene, shape: tuple[int, ...]) -> np.ndarray | None:
+def _wanted(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray | None) -> Any:
+    """What the user wants of the motion, by strokes, by their speeds, by a speed map."""
+    from synth.photo.assign import Wanted
+    from synth.photo.guides import orientation, speeds
+
+    photo = scene.photo
+    size = (max(1, round(shape[0] * photo.width / shape[1])), photo.width)
+    strokes = _strokes(scene, shape)
+    speed = speeds(strokes, photo.speeds, size, frozen) if photo.speeds else _speed_map(scene, size)
+    return Wanted(orientation(strokes, size, frozen) if strokes else None, speed)
+
+
+def _speed_map(scene: PhotoScene, size: tuple[int, int]) -> np.ndarray | None:
     """The user's speed map at the scene's size (Y, X), lowest row first, pixels per frame: a map of any size with the
     picture's proportions, so that one that was written at another photo.width is taken too."""
-    file, (rows, columns) = scene.photo.speed, shape[:2]
+    file, (rows, columns) = scene.photo.speed, size
     if file is None:
         return None
     grey = pictures.read_foreign(file, "photo.speed") @ pictures.LUMA
@@ -92,18 +105,19 @@ def _speed(scene: PhotoScene, shape: tuple[int, ...]) -> np.ndarray | None:
     if abs(height * columns - width * rows) > max(width, columns):
         raise BadInput(file, "photo.speed", f"has {width} x {height} pixels: other proportions than the picture, "
                                             f"whose output has {columns} x {rows}")
-    if grey.shape != (rows, columns):
-        grey = pictures.resized(grey[..., None], columns, rows)[..., 0]
+    if grey.shape != size:
+        grey = pictures.resized(grey[..., None], columns, rows, "triangle")[..., 0]
     return np.ascontiguousarray(scene.photo.fastest * np.clip(grey, 0, 1)[::-1], np.float32)
 
 
 def read_strokes(scene: PhotoScene) -> list[np.ndarray]:
     """The strokes, each (K, 2) float64: x, y in pixels of the output, whose lowest left pixel is 0, 0."""
-    return _placed(scene, pictures.read_foreign(scene.photo.file, "photo.file").shape[:2])
+    rows, columns = pictures.read_foreign(scene.photo.file, "photo.file").shape[:2]
+    return _strokes(scene, (rows, columns))
 
 
-def _placed(scene: PhotoScene, shape: tuple[int, ...]) -> list[np.ndarray]:
-    """The strokes of `read_strokes`, of a picture that has `shape` (h, w) in its file.
+def _strokes(scene: PhotoScene, shape: tuple[int, int]) -> list[np.ndarray]:
+    """The strokes of a picture that has `shape` (h, w) in its file, where they are from its upper left.
 
     Raises InvalidValue for one that leaves the picture or has no length.
     """
@@ -113,24 +127,13 @@ def _placed(scene: PhotoScene, shape: tuple[int, ...]) -> list[np.ndarray]:
     strokes = []
     for number, stroke in enumerate(photo.strokes):
         points = np.array(stroke, np.float64)
-        if ((points < -0.5) | (points > np.array(shape[1::-1]) - 0.5)).any():
+        if ((points < -0.5) | (points > np.array(shape[::-1]) - 0.5)).any():
             raise InvalidValue(f"photo.strokes[{number}]", f"leaves the picture of {shape[1]} x {shape[0]} pixels")
         if not np.ptp(points, axis=0).any():
             raise InvalidValue(f"photo.strokes[{number}]", "has no length")
         placed = (points + 0.5) * scale - 0.5
         strokes.append(np.stack([placed[:, 0], height - 1 - placed[:, 1]], axis=-1))
     return strokes
-
-
-def _orientation(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray | None) -> np.ndarray | None:
-    """The orientation map of the strokes."""
-    from synth.photo.guides import orientation
-
-    strokes = _placed(scene, shape)
-    if not strokes:
-        return None
-    height = max(1, round(shape[0] * scene.photo.width / shape[1]))
-    return orientation(strokes, (height, scene.photo.width), frozen)
 
 
 def check_target(scene: PhotoScene) -> None:

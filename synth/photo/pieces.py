@@ -133,18 +133,18 @@ def of_scaled(shape: tuple[int, int], version: Version) -> np.ndarray:
     return to_clip(canvas(shape, version), Version(1.0, version.turn, version.flipped))
 
 
-def pixels(frames: np.ndarray, corner: tuple[int, int], cut: Cut, version: Version) -> np.ndarray:
-    """The frames of one piece: (T, size, size) uint8 of a clip's (T, Y, X) uint8.
+def scaled(frames: np.ndarray, scale: float) -> np.ndarray:
+    """The frames of a clip (T, Y, X) uint8 at a scale of at most 1."""
+    return frames if scale == 1 else np.stack([shrunk(frame, scale) for frame in frames])
 
-    1. The part of the clip that the piece covers, scaled.
-    2. Turned and mirrored.
+
+def pixels(small: np.ndarray, shape: tuple[int, int], corner: tuple[int, int], cut: Cut, version: Version,
+           ) -> np.ndarray:
+    """The frames of one piece: (T, size, size) uint8, turned and mirrored.
+
+    small  (T, y, x) uint8: the clip of `shape` (Y, X), `scaled` as the version is
     """
-    shape = (frames.shape[1], frames.shape[2])
     at = of_scaled(shape, version)
-    # 1. scaled: what INTER_AREA averages
-    small = frames if version.scale == 1 else np.stack([shrunk(frame, version.scale) for frame in frames])
-    # 2. turned
-    moved = at.copy()
-    moved[:, 2] += at[:, :2] @ np.array(corner[::-1], np.float64)
+    at[:, 2] += at[:, :2] @ np.array(corner[::-1], np.float64)
     stacked = np.moveaxis(small, 0, -1)
-    return np.moveaxis(warped(stacked, (cut.size, cut.size), moved), -1, 0)
+    return np.moveaxis(warped(stacked, (cut.size, cut.size), at), -1, 0)

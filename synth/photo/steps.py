@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from synth.photo.assign import Nodes, Shown
-from synth.photo.integrate import Frames, differences, looped, phases, weights
+from synth.photo.integrate import Frames, differences, looped, phases, read
 from synth.photo.motion import CELL, SIGNIFICANT, optical_flow, spectrum, textureness
-from synth.photo.pieces import VERSIONS, Cut, pixels
+from synth.photo.pieces import Cut
 
 
 class Piece(NamedTuple):
@@ -64,16 +64,16 @@ class Neighbours(NamedTuple):
     corner       (2, 2) int64: row and column of the lowest left pixel of each, on the target
     pieces       (2, size, size) uint8
     differences  (2, size, size) float32, grey levels
-    plain        (size, W) float32: their differences with weights that add up to one, as in §6, without bands
-    banded       (size, W) float32: as `integrate` has them
-    deviation    (2, W) float64: deviation over time of each column of `plain` and of `banded`, grey levels
+    shares       (size, W) float32: their differences with weights that add up to one, as in the paper
+    roots        (size, W) float32: with weights whose squares add up to one
+    deviation    (2, W) float64: deviation over time of each column of `shares` and of `roots`, grey levels
     """
 
     corner: np.ndarray
     pieces: np.ndarray
     differences: np.ndarray
-    plain: np.ndarray
-    banded: np.ndarray
+    shares: np.ndarray
+    roots: np.ndarray
     deviation: np.ndarray
 
 
@@ -93,26 +93,21 @@ def neighbours(of: Nodes, shown: Shown, frames: Frames, edge: int, cut: Cut, len
     """The two nodes of an edge that lie beside each other, integrated alone (fig. 9), as `differences` does with all.
 
     1. Their pieces and differences, each from its own phase.
-    2. Blended plainly, by the squares of the weights of the widest ramp: these add up to one.
-    3. Blended band by band.
+    2. Blended by shares, as in the paper, and by roots.
     """
     rows = of.edges[edge]
     pair = Nodes(of.corner[rows] - of.corner[rows[0]], np.array([[0, 1]]), np.array([True]))
     two = Shown(*(part[rows] for part in shown))
     # 1. pieces
-    whole = [pixels(frames(int(two.clip[p])), (int(two.corner[p, 0]), int(two.corner[p, 1])), cut,
-                    VERSIONS[int(two.version[p])]).astype(np.float32) for p in (0, 1)]
-    averages = [piece.mean(axis=0) for piece in whole]
-    apart = [looped(piece - average, length, start)
-             for piece, average, start in zip(whole, averages, phases(pair, two, seed).tolist(), strict=True)]
-    # 2. plainly
+    start = phases(pair, two, seed)
+    averages, first = (np.empty((2, cut.size, cut.size), np.float32) for _ in range(2))
+    for p, piece in read(two, frames, cut):
+        averages[p] = piece.mean(axis=0)
+        first[p] = looped(piece - averages[p], length, int(start[p]))[0]
+    # 2. blended
     shape = (cut.size, cut.size + cut.stride)
-    plain = np.zeros((length, *shape), np.float32)
-    for p, share in enumerate(weights(pair, shape, cut)[:, -1] ** 2):
-        plain[:, :, p * cut.stride:p * cut.stride + cut.size] += share * apart[p]
-    # 3. by bands
-    banded = differences(pair, two, frames, shape, cut, length, seed).bands.sum(axis=0)
-    deviation = [np.sqrt((values.astype(np.float64) ** 2).mean(axis=(0, 1))) for values in (plain, banded)]
-    first = np.stack([difference[0] for difference in apart])
-    pieces = np.clip(np.rint(np.stack(averages) + first), 0, 255).astype(np.uint8)
-    return Neighbours(of.corner[rows], pieces, first, plain[0], banded[0], np.stack(deviation))
+    shares, roots = (differences(pair, two, frames, shape, cut, length, seed, blending).bands.sum(axis=0)
+                     for blending in ("shares", "roots"))
+    deviation = [np.sqrt((values.astype(np.float64) ** 2).mean(axis=(0, 1))) for values in (shares, roots)]
+    pieces = np.clip(np.rint(averages + first), 0, 255).astype(np.uint8)
+    return Neighbours(of.corner[rows], pieces, first, shares[0], roots[0], np.stack(deviation))

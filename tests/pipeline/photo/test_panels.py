@@ -22,7 +22,7 @@ def test_with_moments_the_still_has_one_result_for_each(tmp_path: Path) -> None:
 
 PIECES = changed(PHOTO, '["target", "matte", "motion", "result"]\npanel = 32',
                  '["target", "piece", "spectrum", "strokes", "average", "result"]\npanel = 32\n'
-                 'pieces = [[1, 0.5, 0.5], [1, 0.25, 0.5]]')
+                 'pieces = [["cloud-01", 0.5, 0.5], ["cloud-01", 0.25, 0.5]]')
 
 
 def test_panels_of_pieces_stand_in_turn_as_far_as_they_follow_each_other(tmp_path: Path) -> None:

@@ -16,7 +16,8 @@ from render import tonemap
 
 NAMES = ", ".join(f'"{name}"' for name in get_args(OfPiece))
 PIECES = changed(PHOTO, '["target", "matte", "motion", "result"]\npanel = 32',
-                 f"[{NAMES}]\npanel = 64\nanimation = false\npieces = [[1, 0.5, 0.75], [1, 0.25, 0.9]]")
+                 f"[{NAMES}]\npanel = 64\nanimation = false\n"
+                 'pieces = [["cloud-01", 0.5, 0.75], ["cloud-01", 0.25, 0.9]]')
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +26,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> BuildGraph:
 
 
 def test_a_piece_is_of_its_clip_and_place(made: BuildGraph) -> None:
-    luma, piece = made.read("", "clip-001", 0)["luma"], made.read("", "piece-1", 0)
+    luma, piece = made.read("", "clip-cloud-01", 0)["luma"], made.read("", "piece-1", 0)
     np.testing.assert_array_equal(piece["corner"], [8, 24])  # round a quarter of 64 from below
     np.testing.assert_array_equal(piece["frames"], luma[:, 8:24, 24:40])
     np.testing.assert_array_equal(piece["clip"], luma[0])
@@ -60,5 +61,5 @@ def test_textureness_of_all_pieces_has_one_scale(made: BuildGraph) -> None:
 
 
 def test_a_figure_without_such_panels_needs_none(tmp_path: Path) -> None:
-    text = changed(PHOTO, "panel = 32", "panel = 32\npieces = [[1, 0.5, 0.5]]")
+    text = changed(PHOTO, "panel = 32", 'panel = 32\npieces = [["cloud-01", 0.5, 0.5]]')
     assert piece_artifacts(tiny.scene(tmp_path, text)) == ()

@@ -53,7 +53,7 @@ def test_the_orientation_map_is_pale_outside_the_fluid(made: BuildGraph) -> None
 
 
 def test_the_database_has_the_clips_of_the_scene(made: BuildGraph) -> None:
-    first = made.read("", "clip-001", 0)["luma"][0, ::-1].astype(float)
+    first = made.read("", "clip-cloud-01", 0)["luma"][0, ::-1].astype(float)
     page = shown(made, "database")[..., 0] * 255
     assert page.shape[1] == 192
     small = page.reshape(64, -1, 64, 3).mean(axis=(1, 3)) if page.shape[0] % 64 == 0 else page[:64, :64]

@@ -55,10 +55,10 @@ def shown():
                  np.zeros((2, CELLS, CELLS, 2), np.float32))
 
 
-def test_plain_weights_lose_deviation_between_pieces_and_ours_do_not():
+def test_weights_that_add_up_to_one_lose_deviation_between_pieces_and_their_roots_do_not():
     clips = {0: noise(4, 96), 1: noise(5, 96)}
     found = neighbours(of_two(), shown(), clips.__getitem__, 0, CUT, 96, 1)
-    assert found.plain.shape == found.banded.shape == (32, 48)
+    assert found.shares.shape == found.roots.shape == (32, 48)
     ends = found.deviation[:, [*range(8), *range(40, 48)]].mean(axis=1)
     between = found.deviation[:, 22:26].mean(axis=1) / ends
     assert between[0] == pytest.approx(np.sqrt(0.5), abs=0.04)
@@ -68,7 +68,7 @@ def test_plain_weights_lose_deviation_between_pieces_and_ours_do_not():
 def test_outside_their_overlap_each_is_what_it_was():
     clips = {0: noise(6), 1: noise(7)}
     found = neighbours(of_two(), shown(), clips.__getitem__, 0, CUT, 24, 1)
-    for blended in (found.plain, found.banded):
+    for blended in (found.shares, found.roots):
         np.testing.assert_allclose(blended[:, :15], found.differences[0][:, :15], atol=0.1)
         np.testing.assert_allclose(blended[:, 33:], found.differences[1][:, 17:], atol=0.1)
     average = clips[0][:, 8:40, 8:40].mean(axis=0)
