@@ -150,3 +150,15 @@ def test_resizing_keeps_a_plain_colour_and_the_way_up() -> None:
     half[:4] = 1  # white on top
     small = pictures.resized(half, 4, 4)
     assert small.shape == (4, 4, 3) and small[0].min() > 0.9 and small[-1].max() < 0.1
+
+
+@pytest.mark.parametrize(("size", "scaled"), [((120, 80), (60, 40)), ((1280, 852), (240, 160)), ((60, 40), (120, 80))])
+def test_the_triangle_kernel_does_not_overshoot(size: tuple[int, int], scaled: tuple[int, int]) -> None:
+    """A mask stays black far from what is white, and white inside it."""
+    mask = np.zeros((size[1], size[0], 1), np.float32)
+    mask[:, size[0] // 2:] = 1
+    small = pictures.resized(mask, *scaled, "triangle")[..., 0]
+    middle, reach = scaled[0] // 2, 2
+    np.testing.assert_array_equal(small[:, :middle - reach], 0)
+    np.testing.assert_allclose(small[:, middle + reach:], 1, atol=1e-6)
+    assert (np.diff(small, axis=1) >= -1e-6).all()
