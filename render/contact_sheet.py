@@ -48,7 +48,7 @@ def thumbnails(frames: Sequence[np.ndarray], width: int, aspect: float) -> np.nd
     best = math.sqrt(len(frames) * aspect * rows / columns)
     beside = min(max(1, round(best)), len(frames))
     edges = np.rint(np.linspace(0, width + GAP, beside + 1)).astype(int)
-    height = max(1, round((width / beside - GAP) * rows / columns))
+    height = max(1, round(((width + GAP) / beside - GAP) * rows / columns))
     page = np.ones((-(-len(frames) // beside) * (height + GAP) - GAP, width, 3), np.float32)
     for number, frame in enumerate(frames):
         row, column = divmod(number, beside)
