@@ -5,7 +5,7 @@ Pictures are in linear light, top row first; synth.photo has display values, the
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -32,18 +32,33 @@ def _database(inputs: Inputs, index: list[str]) -> Any:
     return Database.joined([Index(**inputs.read(name)) for name in index], inputs.read("codebook")["words"])
 
 
-def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index: list[str],
+def frames_of(inputs: Inputs, clips: list[str]) -> Callable[[int], np.ndarray]:
+    """The frames of each clip, read when they are wanted."""
+    read: dict[int, np.ndarray] = {}
+
+    def luma(number: int) -> np.ndarray:
+        if number not in read:
+            read[number] = inputs.read(clips[number])["luma"]
+        return read[number]
+
+    return luma
+
+
+def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index: list[str], clips: list[str],
                     ) -> Iterator[tuple[int, arrays.Arrays]]:
     """Which piece of which clip is shown where (§5), and the motion."""
     from synth.photo.animate import motion
     from synth.photo.assign import assign
+    from synth.photo.fit import fitted
 
     target, database, cut = read_target(scene), _database(inputs, index), cut_of(scene)
     of, found = assign(target.grey, target.fluid, database, cut, target.wanted, scene.assignment.settings())
     shown = found.shown(database)
+    if scene.assignment.energy == "mended":
+        shown = fitted(target.grey, of, shown, found.exposure, frames_of(inputs, clips), cut)
     yield 0, {"node": of.corner, "edges": of.edges, "across": of.across, "clip": shown.clip, "version": shown.version,
-              "corner": shown.corner, "cells": shown.motion, "exposure": found.exposure, "angle": found.angle,
-              "energies": np.array(found.energies), "motion": motion(target, of, shown, cut)}
+              "corner": shown.corner, "cells": shown.motion, "fit": shown.fit, "exposure": found.exposure,
+              "angle": found.angle, "energies": np.array(found.energies), "motion": motion(target, of, shown, cut)}
 
 
 def assigned(inputs: Inputs) -> tuple[Any, Any]:
@@ -52,7 +67,7 @@ def assigned(inputs: Inputs) -> tuple[Any, Any]:
 
     kept = inputs.read("assignment")
     return (Nodes(kept["node"], kept["edges"], kept["across"]),
-            Shown(kept["clip"], kept["version"], kept["corner"], kept["cells"]))
+            Shown(kept["clip"], kept["version"], kept["corner"], kept["cells"], kept["fit"]))
 
 
 def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
@@ -63,18 +78,11 @@ def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list
     from synth.photo.integrate import differences
 
     target, cut, (of, shown) = read_target(scene), cut_of(scene), assigned(inputs)
-    read: dict[int, np.ndarray] = {}
-
-    def luma(number: int) -> np.ndarray:
-        if number not in read:
-            read[number] = inputs.read(clips[number])["luma"]
-        return read[number]
-
     box = target.box(cut.size)
     part = target.part(box)
     moved = of._replace(corner=of.corner - [box[0].start, box[1].start])
     rows, columns = part.matte.shape
-    more = differences(moved, shown, luma, (rows, columns), cut, scene.frames, scene.seed,
+    more = differences(moved, shown, frames_of(inputs, clips), (rows, columns), cut, scene.frames, scene.seed,
                        scene.photo.blending)
     look = Look(scene.photo.carried, scene.photo.feature, scene.photo.strength, scene.photo.matching)
     whole, moves = target.picture.copy(), inputs.read("assignment")["motion"][box]
@@ -122,8 +130,8 @@ def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     clips, index = names(scene, "clip"), names(scene, "index")
     return (
         Artifact("assignment", "synth", arrays.ARRAYS, ("photo", "assignment"),
-                 (("codebook", "once"), *((name, "once") for name in index)), make_assignment, {"index": index},
-                 animated=False, check=check_target),
+                 (("codebook", "once"), *((name, "once") for name in (*index, *clips))), make_assignment,
+                 {"index": index, "clips": clips}, animated=False, check=check_target),
         Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
                  (("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
         Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (("fluid", "every"),), make_mattes),

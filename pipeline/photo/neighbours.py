@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.build.artifact import Artifact, Inputs
 from pipeline.files import arrays
 from pipeline.photo.clips import names
-from pipeline.photo.frames import assigned, cut_of
+from pipeline.photo.frames import assigned, cut_of, frames_of
 from pipeline.photo.tables import OfPair, PhotoScene
 from pipeline.photo.target import read_target
 from pipeline.photo.views import Pictures, View, picture
@@ -30,8 +30,7 @@ def make_neighbours(scene: PhotoScene, inputs: Inputs, frames: list[int], clips:
     rows, columns = inputs.read("assignment")["motion"].shape[:2]
     x, y = scene.figure.place
     edge = nearest_edge(of, (x * columns - 0.5, (1 - y) * rows - 0.5), cut_of(scene))
-    yield 0, neighbours(of, shown, lambda number: inputs.read(clips[number])["luma"], edge, cut_of(scene), scene.frames,
-                        scene.seed)._asdict()
+    yield 0, neighbours(of, shown, frames_of(inputs, clips), edge, cut_of(scene), scene.frames, scene.seed)._asdict()
 
 
 def make_place(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Pictures:

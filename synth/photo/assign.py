@@ -116,13 +116,14 @@ class Wanted(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What each of P nodes shows: the clip (P,), the version (P,) and the corner (P, 2) of its piece, and the mean
-    motion of its cells (P, CELLS, CELLS, 2), pixels per frame."""
+    """What each of P nodes shows: the clip (P,), the version (P,) and the corner (P, 2) of its piece, the mean motion
+    of its cells (P, CELLS, CELLS, 2), pixels per frame, and how it is fitted (P,), which of FITS."""
 
     clip: np.ndarray
     version: np.ndarray
     corner: np.ndarray
     motion: np.ndarray
+    fit: np.ndarray
 
 
 class Assigned(NamedTuple):
@@ -140,10 +141,10 @@ class Assigned(NamedTuple):
     energies: tuple[float, float]
 
     def shown(self, database: Database) -> Shown:
-        """What the nodes show."""
+        """What the nodes show, not fitted yet."""
         pieces, row = database.pieces, self.piece
         return Shown(database.clip[row], pieces.version[row], pieces.corner[row].astype(np.int64),
-                     pieces.features[row][..., MEAN].astype(np.float32))
+                     pieces.features[row][..., MEAN].astype(np.float32), np.zeros(len(row), np.int64))
 
 
 def nodes(matte: np.ndarray, cut: Cut) -> Nodes:

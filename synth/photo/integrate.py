@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 
 from synth.photo.assign import Nodes, Shown
-from synth.photo.pieces import VERSIONS, Cut, pixels, scaled
+from synth.photo.pieces import FITS, VERSIONS, Cut, pixels, scaled
 
 BANDS = 3
 """Of the differences: below 1, 2 and 4 pixels of σ, the last with all that is coarser."""
@@ -60,15 +60,22 @@ def differences(of: Nodes, shown: Shown, frames: Frames, shape: tuple[int, int],
 
 
 def read(shown: Shown, frames: Frames, cut: Cut) -> Iterator[tuple[int, np.ndarray]]:
-    """The nodes and the frames (T, size, size) float32 of their pieces, so that each clip is scaled once."""
+    """The nodes and the frames (T, size, size) float32 of their pieces."""
+    for p, small, shape in by_clip(shown, frames):
+        corner = (int(shown.corner[p, 0]), int(shown.corner[p, 1]))
+        found = pixels(small, shape, corner, cut, VERSIONS[int(shown.version[p])], FITS[int(shown.fit[p])])
+        yield p, found.astype(np.float32)
+
+
+def by_clip(shown: Shown, frames: Frames) -> Iterator[tuple[int, np.ndarray, tuple[int, int]]]:
+    """The nodes, so that each clip is scaled once: their clip at the scale of their version, and its whole shape."""
     scales = np.array([version.scale for version in VERSIONS])[shown.version]
     last, small = (-1, 0.0), np.empty(0)
     for p in np.lexsort((scales, shown.clip)).tolist():
-        clip, version = frames(int(shown.clip[p])), VERSIONS[int(shown.version[p])]
-        if last != (last := (int(shown.clip[p]), version.scale)):
-            small = scaled(clip, version.scale)
-        corner = (int(shown.corner[p, 0]), int(shown.corner[p, 1]))
-        yield p, pixels(small, (clip.shape[1], clip.shape[2]), corner, cut, version).astype(np.float32)
+        clip = frames(int(shown.clip[p]))
+        if last != (last := (int(shown.clip[p]), float(scales[p]))):
+            small = scaled(clip, float(scales[p]))
+        yield p, small, (clip.shape[1], clip.shape[2])
 
 
 def bands(values: np.ndarray) -> list[np.ndarray]:

@@ -15,7 +15,7 @@ STRAIGHT = VERSIONS.index((1.0, 0.0, False))
 def shown(corners, clips, velocity=(0.0, 0.0)):
     count = len(corners)
     return Shown(np.array(clips), np.full(count, STRAIGHT), np.array(corners),
-                 np.broadcast_to(np.float32(velocity), (count, CELLS, CELLS, 2)))
+                 np.broadcast_to(np.float32(velocity), (count, CELLS, CELLS, 2)), np.zeros(count, int))
 
 
 def noise(seed, frames=12, shape=(80, 112)):

@@ -52,7 +52,7 @@ def of_two(across=True):
 
 def shown():
     return Shown(np.array([0, 1]), np.full(2, STRAIGHT), np.array([[8, 8], [30, 40]]),
-                 np.zeros((2, CELLS, CELLS, 2), np.float32))
+                 np.zeros((2, CELLS, CELLS, 2), np.float32), np.zeros(2, np.int64))
 
 
 def test_weights_that_add_up_to_one_lose_deviation_between_pieces_and_their_roots_do_not():
