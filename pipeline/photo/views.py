@@ -81,7 +81,8 @@ def make_database(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: l
     from render import contact_sheet, tonemap
 
     rows, columns = read_target(scene).matte.shape
-    first = [inputs.read(name)["luma"][0] for name in clips]
+    # copies: a view would keep the whole of each clip in memory
+    first = [inputs.read(name)["luma"][0].copy() for name in clips]
     yield 0, tonemap.from_srgb(contact_sheet.thumbnails(first, scene.figure.panel, columns / rows))
 
 
