@@ -6,6 +6,7 @@ prints tables, writes each part's section of bench/RESULTS.md, and out/bench.jso
     machine      what it is all measured on, and the revision
     flows        the coarse motions L of the tables
     plot         curves as an SVG
+    fluid        measures of a picture that flows: its look, its motion, its pieces, its loop
 
     synthesis    ma09 2-D: time, memory, and the speed-up over the reference
     reference    the same synthesis in plain NumPy and SciPy
