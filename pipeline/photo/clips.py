@@ -1,10 +1,12 @@
 """[clips]: the database of clips (okabe11 §4) as artifacts.
 
-    clip-001 …   the frames and the mean velocity of a clip, made by synth.photo.clips or read from a user's video
-    codebook     visual words
-    index-001 …  the pieces of a clip as assignment compares them
+    clip-fall-01 …   the frames and the mean velocity of a clip that synth.photo.clips makes
+    clip-own-01 …    the same, read from a user's video
+    codebook         visual words
+    index-fall-01 …  the pieces of a clip as assignment compares them
 
-Each is kept once for all scenes, in out/shared. A run that is interrupted goes on with the clip that it was at.
+Each is kept once for all scenes, in out/shared; a clip that is made has one name in all of them. A run that is
+interrupted goes on with the clip that it was at.
 """
 
 from __future__ import annotations
@@ -53,7 +55,8 @@ class Clips(Table):
 
 def names(scene: PhotoScene, kind: str) -> list[str]:
     """The artifacts of all clips, "clip" or "index"."""
-    return [f"{kind}-{number:03d}" for number in range(1, len(scene.clips.recipes()) + len(scene.clips.files) + 1)]
+    own = [f"own-{number:02d}" for number in range(1, len(scene.clips.files) + 1)]
+    return [f"{kind}-{name}" for name in [*(recipe.name for recipe in scene.clips.recipes()), *own]]
 
 
 def make_clip(scene: PhotoScene, inputs: Inputs, frames: list[int], family: str, seed: int, variation: dict[str, Any],

@@ -38,23 +38,30 @@ def write(folder: Path, frames: np.ndarray, name: str = "c.mp4") -> Path:
 def test_names_are_of_all_clips_in_order(tmp_path: Path) -> None:
     write(tmp_path, falling())
     both = scene(tmp_path, changed(PHOTO, "count = 1", 'count = 2\nfiles = ["c.mp4"]'))
-    assert names(both, "clip") == ["clip-001", "clip-002", "clip-003"]
+    assert names(both, "clip") == ["clip-cloud-01", "clip-cloud-02", "clip-own-01"]
     assert [a.name for a in METHOD.artifacts(both)[:7]] == [
-        "clip-001", "clip-002", "clip-003", "codebook", "index-001", "index-002", "index-003"]
+        "clip-cloud-01", "clip-cloud-02", "clip-own-01", "codebook", "index-cloud-01", "index-cloud-02", "index-own-01"]
 
 
 def test_another_number_of_clips_makes_none_of_them_again(tmp_path: Path) -> None:
     few, many = (tiny.graph(tmp_path, changed(PHOTO, "count = 1", f"count = {n}")) for n in (2, 5))
-    for name in ("clip-001", "clip-002"):
+    for name in ("clip-cloud-01", "clip-cloud-02"):
         assert few.content_id("", name) == many.content_id("", name)
     assert few.content_id("", "codebook") != many.content_id("", "codebook")
-    assert few.content_id("", "clip-001") != few.content_id("", "clip-002")
+    assert few.content_id("", "clip-cloud-01") != few.content_id("", "clip-cloud-02")
+
+
+def test_a_clip_has_one_name_in_all_scenes(tmp_path: Path) -> None:
+    one = tiny.graph(tmp_path, PHOTO)
+    more = changed(PHOTO, 'families = ["cloud"]', 'families = ["fall", "cloud"]')
+    other = tiny.graph(tmp_path, changed(more, "count = 1", "count = 9"))
+    assert one.content_id("", "clip-cloud-01") == other.content_id("", "clip-cloud-01")
 
 
 def test_the_photograph_is_in_no_clip(tmp_path: Path) -> None:
     one = tiny.graph(tmp_path, PHOTO)
     other = tiny.graph(tmp_path, changed(PHOTO, "width = 96", "width = 128"))
-    for name in ("clip-001", "codebook", "index-001"):
+    for name in ("clip-cloud-01", "codebook", "index-cloud-01"):
         assert one.content_id("", name) == other.content_id("", name)
 
 
@@ -88,7 +95,7 @@ def test_a_made_clip_is_what_its_recipe_gives(tmp_path: Path) -> None:
 
     made = tiny.made(tmp_path, PHOTO, "synth")
     recipe = next(r for r in catalogue(150) if r.family == "cloud")
-    stored = made.read("", "clip-001", 0)
+    stored = made.read("", "clip-cloud-01", 0)
     expected = recipe.clip(16, (64, 64))
     np.testing.assert_array_equal(stored["luma"], expected.luma)
     np.testing.assert_array_equal(stored["velocity"], expected.velocity)
