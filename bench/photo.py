@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from bench import fluid, subjects
 from bench.machine import peak_memory
@@ -34,7 +33,7 @@ from pipeline.photo.clips import SAMPLED, names
 from pipeline.progress import Progress
 from pipeline.scene import load
 from synth.photo.animate import Look, Target, composed, motion, over_background
-from synth.photo.assign import Assigned, Database, Nodes, Settings, assign
+from synth.photo.assign import ANGLES, Assigned, Database, Nodes, Settings, assign
 from synth.photo.clips import clip
 from synth.photo.index import Index, exposures, index
 from synth.photo.integrate import Frames, differences
@@ -44,7 +43,6 @@ from synth.photo.words import codebook, descriptors
 FRAMES, SEED, CUT = 96, 1, Cut()
 OUT = Path("out")
 MOMENTS = 8  # how manieth frames' contrast is measured
-NEAR_FROZEN = 2  # pixels: what stands still, with its border
 ANALYSED = 5  # how manieth clips are analysed again to time it
 
 
@@ -69,6 +67,8 @@ class Variant(NamedTuple):
 
 
 OURS = "ours"
+ITSELF = "the clip itself"
+"""The frames that the target is one of: what the measures say of a fluid without fault."""
 VARIANTS = {
     OURS: Variant(Settings(), Look()),
     "ours, differences alone": Variant(Settings(), Look(carried=0)),
@@ -150,34 +150,32 @@ def rounded(value: float) -> float | None:
     return None if np.isnan(value) else round(float(value), 3)
 
 
-def look(name: str, variant: str, subject: Subject, found: Animated) -> dict[str, Any]:
-    """Look, direction, pieces and loop of an animation, beside its target."""
-    target, frames = subject.target, found.frames
+def look(name: str, way: str, subject: Subject, frames: np.ndarray) -> dict[str, Any]:
+    """Look, direction, pieces and loop of frames (T, Y, X), beside their target."""
+    target = subject.target
     grey, matte = target.picture.mean(axis=2), target.fluid
     lattice = fluid.lattice(frames, matte, CUT.stride)
-    return {"target": name, "way": variant, "nodes": len(found.of.corner),
-            "low-pass": rounded(fluid.low_pass(frames, grey, matte)),
+    return {"target": name, "way": way, "low-pass": rounded(fluid.low_pass(frames, grey, matte)),
             **{f"{sigma:g} px": rounded(value) for sigma, value in zip(
                 fluid.SIGMAS, fluid.contrast(frames[::MOMENTS], grey, matte), strict=True)},
             "angle to strokes": rounded(fluid.angle(fluid.mean_flow(frames), subject.orientation,
                                                     matte * fluid.visible(grey, matte))),
             "deviation": rounded(lattice.deviation), "gradient": rounded(lattice.gradient),
-            "edges": None if target.frozen is None else rounded(fluid.edges(frames, grey, ndimage.binary_dilation(
-                target.frozen, iterations=NEAR_FROZEN))),
-            "loop": rounded(fluid.loop(frames, matte)), "nodes widened": int((found.assigned.angle > 45).sum())}
+            "edges": None if target.frozen is None else rounded(fluid.edges(frames, grey, target.frozen)),
+            "loop": rounded(fluid.loop(frames, matte))}
 
 
-def truth(name: str, strokes: str, subject: Subject, found: Animated) -> dict[str, Any]:
-    """Motion and temporal spectrum of an animation beside those of the clip that its target is a frame of."""
+def truth(name: str, strokes: str, subject: Subject, frames: np.ndarray) -> dict[str, Any]:
+    """Motion and temporal spectrum of frames (T, Y, X) beside those of the clip that their target is a frame of."""
     assert subject.truth is not None, "truth is of clips"
     grey, matte = subject.target.picture.mean(axis=2), subject.target.fluid
     where = subject.flows & fluid.visible(grey, matte)
     spectrum = fluid.spectrum(subject.frames, matte)
     return {"target": name, "strokes": strokes,
-            "angle": rounded(fluid.angle(fluid.mean_flow(found.frames), subject.truth.velocity, where)),
+            "angle": rounded(fluid.angle(fluid.mean_flow(frames), subject.truth.velocity, where)),
             "angle of the clip's own flow": rounded(fluid.angle(fluid.mean_flow(subject.frames),
                                                                 subject.truth.velocity, where)),
-            "spectrum": rounded(fluid.spectrum_distance(fluid.spectrum(found.frames, matte), spectrum))}
+            "spectrum": rounded(fluid.spectrum_distance(fluid.spectrum(frames, matte), spectrum))}
 
 
 def minimized(name: str, subject: Subject, of_clips: Stock) -> dict[str, Any]:
@@ -206,10 +204,14 @@ def pictures_of(scale: Scale) -> dict[str, Any]:
             name, FRAMES, scale.size)
         for variant in VARIANTS if name in COMPARED else (OURS,):
             found = animated(subject.guided, of_clips, VARIANTS[variant])
-            looks.append(look(name, variant, subject, found))
+            looks.append(look(name, variant, subject, found.frames) | {
+                "nodes": len(found.of.corner), "nodes widened": int((found.assigned.angle > ANGLES[0]).sum())})
             if subject.truth is not None and variant == OURS:
                 alone = animated(subject.target, of_clips, VARIANTS[OURS])
-                truths += [truth(name, "without", subject, alone), truth(name, "with", subject, found)]
+                truths += [truth(name, strokes, subject, frames) for strokes, frames in (
+                    ("without", alone.frames), ("with", found.frames))]
+        if subject.truth is not None:
+            looks.append(look(name, ITSELF, subject, subject.frames) | {"nodes": None, "nodes widened": None})
         if name in MINIMIZED:
             energies.append(minimized(name, subject, of_clips))
     return {"pieces": len(of_clips.database.clip), "look": looks, "truth": truths, "minimizers": energies}

@@ -35,6 +35,8 @@ COVERED = 0.05
 """Share of the time in which fluid is seen at a place that does not stand still."""
 SHORE = 1.5
 """σ, pixels, of the matte's border."""
+SPECK = 2
+"""Pixels: what stands still and is no wider than two of them is not drawn into the freeze mask."""
 ACROSS, ALONG = 4, 3
 """Strokes from left to right, and one over the other."""
 STROKE = 0.15
@@ -88,7 +90,7 @@ def of_clip(name: str, length: int, size: tuple[int, int]) -> Subject:
     wet = truth.coverage > COVERED
     whole = ndimage.binary_fill_holes(wet)
     matte = ndimage.gaussian_filter(whole.astype(np.float32), SHORE)
-    frozen = whole & ~wet
+    frozen = ndimage.binary_opening(whole & ~wet, iterations=SPECK)
     middle = length // 2
     grey = np.repeat(truth.luma[middle][..., None], 3, axis=2)
     picture = grey if truth.chroma is None else truth.chroma[middle]
