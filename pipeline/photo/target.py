@@ -23,7 +23,6 @@ def read_target(scene: PhotoScene) -> Any:
     Raises BadInput for a file that is no use, InvalidValue for strokes that are none.
     """
     from synth.photo.animate import Target
-    from synth.photo.assign import Wanted
 
     photo = scene.photo
     picture = pictures.read_foreign(photo.file, "photo.file")
@@ -43,9 +42,7 @@ def read_target(scene: PhotoScene) -> Any:
     if frozen is not None and not ((_scaled(scene, matte[..., None])[..., 0] >= FULL) & ~frozen).any():
         raise BadInput(scene.photo.frozen or "", "photo.frozen", "covers all of the matte")
     background = _background(scene, shape, small, _scaled(scene, matte[..., None])[..., 0])
-    speed = None if photo.speed is None else np.float32(photo.fastest) * _scaled(
-        scene, _mask(scene, photo.speed, "photo.speed", shape)[..., None])[..., 0]
-    wanted = Wanted(_orientation(scene, shape, frozen), speed)
+    wanted = _wanted(scene, shape, frozen)
     return Target(small, _scaled(scene, matte[..., None])[..., 0], background, frozen, wanted)
 
 
@@ -82,13 +79,26 @@ def _scaled(scene: PhotoScene, picture: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.clip(resized, 0, 1)[::-1], np.float32)
 
 
-def _orientation(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray | None) -> np.ndarray | None:
-    """The orientation map of the strokes, which are in pixels of the file from its upper left."""
-    from synth.photo.guides import orientation
+def _wanted(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray | None) -> Any:
+    """What the user wants of the motion, by strokes, by their speeds, by a speed map."""
+    from synth.photo.assign import Wanted
+    from synth.photo.guides import orientation, speeds
 
     photo = scene.photo
-    if not photo.strokes:
-        return None
+    size = (max(1, round(shape[0] * photo.width / shape[1])), photo.width)
+    strokes = _strokes(scene, shape)
+    speed = None
+    if photo.speeds:
+        speed = speeds(strokes, photo.speeds, size, frozen)
+    elif photo.speed is not None:
+        map_ = _scaled(scene, _mask(scene, photo.speed, "photo.speed", shape)[..., None])[..., 0]
+        speed = np.float32(photo.fastest) * map_
+    return Wanted(orientation(strokes, size, frozen) if strokes else None, speed)
+
+
+def _strokes(scene: PhotoScene, shape: tuple[int, int]) -> list[np.ndarray]:
+    """The strokes, in the file in pixels from its upper left, in pixels of the output, y up."""
+    photo = scene.photo
     scale = photo.width / shape[1]
     height = max(1, round(shape[0] * scale))
     strokes = []
@@ -100,7 +110,7 @@ def _orientation(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray |
             raise InvalidValue(f"photo.strokes[{number}]", "has no length")
         placed = (points + 0.5) * scale - 0.5
         strokes.append(np.stack([placed[:, 0], height - 1 - placed[:, 1]], axis=-1))
-    return orientation(strokes, (height, photo.width), frozen)
+    return strokes
 
 
 def check_target(scene: PhotoScene) -> None:
