@@ -15,7 +15,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -33,10 +32,11 @@ from pipeline.photo.clips import SAMPLED, names
 from pipeline.progress import Progress
 from pipeline.scene import load
 from synth.photo.animate import Look, Target, composed, motion, over_background
-from synth.photo.assign import ANGLES, Assigned, Database, Nodes, Settings, assign
+from synth.photo.assign import ANGLES, Assigned, Database, Nodes, Settings, Shown, assign
 from synth.photo.clips import clip
+from synth.photo.fit import fitted
 from synth.photo.index import Index, exposures, index
-from synth.photo.integrate import Frames, differences
+from synth.photo.integrate import Blending, Frames, differences
 from synth.photo.pieces import Cut
 from synth.photo.words import codebook, descriptors
 
@@ -60,10 +60,11 @@ SCALES = {"full": Scale(150, (320, 240), 640, (640, 480)), "small": Scale(16, (1
 
 
 class Variant(NamedTuple):
-    """A way to assign pieces and one to compose frames."""
+    """A way to assign pieces, one to compose frames, and one to blend pieces."""
 
     settings: Settings
     look: Look
+    blending: Blending = "roots"
 
 
 OURS = "ours"
@@ -73,6 +74,9 @@ VARIANTS = {
     OURS: Variant(Settings(), Look()),
     "ours, differences alone": Variant(Settings(), Look(carried=0)),
     "ours, histograms": Variant(Settings(), Look(matching="histograms")),
+    "the paper to the letter": Variant(
+        Settings(sigma=100, rho=10000, weight=0.01, minimizer="expansion", energy="printed"),
+        Look(carried=0, matching="regions"), "shares"),
 }
 """Ours is measured on all targets, the others on those of COMPARED. Another one is one line here."""
 PHOTOGRAPH = "stream"
@@ -133,16 +137,24 @@ class Animated(NamedTuple):
 
 def animated(target: Target, of_clips: Stock, variant: Variant) -> Animated:
     """The whole method on one target."""
-    (of, found), assigning = timed(lambda: assign(target.grey, target.fluid, of_clips.database, CUT, target.wanted,
-                                                  variant.settings))
-    shown = found.shown(of_clips.database)
-    more, integrating = timed(lambda: differences(of, shown, of_clips.frames, target.matte.shape, CUT, FRAMES, SEED))
+    (of, found, shown), assigning = timed(lambda: _assigned(target, of_clips, variant.settings))
+    more, integrating = timed(lambda: differences(of, shown, of_clips.frames, target.matte.shape, CUT, FRAMES, SEED,
+                                                  variant.blending))
     moves = motion(target, of, shown, CUT)
     frames, composing = timed(lambda: np.stack([
         over_background(target, picture, target.matte).mean(axis=2)
         for picture in composed(target, more, moves, variant.look, SEED)]))
     return Animated(of, found, frames, {"assignment": assigning["wall"], "integration": integrating["wall"],
                                         "composition": composing["wall"]})
+
+
+def _assigned(target: Target, of_clips: Stock, settings: Settings) -> tuple[Nodes, Assigned, Shown]:
+    """The pieces, fitted to the target as a scene's are."""
+    of, found = assign(target.grey, target.fluid, of_clips.database, CUT, target.wanted, settings)
+    shown = found.shown(of_clips.database)
+    if settings.energy == "mended":
+        shown = fitted(target.grey, of, shown, found.exposure, of_clips.frames, CUT)
+    return of, found, shown
 
 
 def rounded(value: float) -> float | None:
@@ -270,7 +282,7 @@ def digest() -> str:
     target = subjects.photograph(128).guided
     parts = [words, *(array for one in (*clips, *indices) for array in vars(one).values() if array is not None)]
     for minimizer in MINIMIZERS:
-        ours = Variant(replace(VARIANTS[OURS].settings, minimizer=minimizer), VARIANTS[OURS].look)
+        ours = VARIANTS[OURS]._replace(settings=Settings(minimizer=minimizer))
         of = animated(target, Stock(database, lambda number: clips[number].luma, len(clips)), ours)
         parts += [of.assigned.piece, of.frames]
     for part in parts:
