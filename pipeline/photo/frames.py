@@ -78,12 +78,17 @@ def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list
             read[number] = inputs.read(clips[number])["luma"]
         return read[number]
 
-    rows, columns = target.matte.shape
-    more = differences(of, shown, luma, (rows, columns), cut, scene.frames, scene.seed)
-    look = Look(scene.photo.carried, scene.photo.strength, scene.photo.matching)
-    for frame, picture in enumerate(composed(target, more, kept["motion"], look, scene.seed), start=1):
+    box = target.box(cut.size)
+    part = target.part(box)
+    moved = of._replace(corner=of.corner - [box[0].start, box[1].start])
+    rows, columns = part.matte.shape
+    more = differences(moved, shown, luma, (rows, columns), cut, scene.frames, scene.seed)
+    look = Look(scene.photo.carried, scene.photo.feature, scene.photo.strength, scene.photo.matching)
+    whole = target.picture.copy()
+    for frame, picture in enumerate(composed(part, more, kept["motion"][box], look, scene.seed), start=1):
         if frame in frames:
-            yield frame, tonemap.from_srgb(np.clip(picture, 0, 1))[::-1].astype(np.float32)
+            whole[box] = np.clip(picture, 0, 1)
+            yield frame, tonemap.from_srgb(whole)[::-1].astype(np.float32)
         if frame == frames[-1]:
             break
 

@@ -34,6 +34,8 @@ class Photo(Table):
     width: int = key("width of the output; the picture is scaled to it", 640, "pixels", ge=64, le=4096)
     carried: Share01 = key("how much of the photograph itself is carried along the motion; 0: the paper's blurred "
                            "average, to which differences are added", 0.85)
+    feature: float = key("size of what moves in the photograph, as streaks, ripples and billows: what is larger "
+                         "stands, as the steps of a stream", 10.0, "pixels of the output", ge=2, le=200)
     strength: float = key("strength of the differences", 1.0, ge=0, le=4)
     matching: Literal["gains", "histograms", "none"] = key(
         "how differences get the look of the picture (§6): \"gains\" by the strength of their bands, over all time, "

@@ -22,7 +22,7 @@ from synth.photo.index import BAND, CELLS, DEVIATION, MEAN, TEXTURE, Index, desc
 from synth.photo.minimize import MINIMIZERS, Energy
 from synth.photo.motion import CELL, textureness
 from synth.photo.pieces import OVERLAP, Cut
-from synth.photo.words import common
+from synth.photo.words import TOTAL, common
 
 ANGLES = (45.0, 60.0, 90.0, 180.0)
 """Degrees between the wanted and a piece's motion: the first that leaves enough candidates."""
@@ -224,21 +224,19 @@ def _candidates(target: _Target, wanted: Wanted, database: Database, settings: S
     """
     pieces = database.pieces
     count, exposures = pieces.histogram.shape[:2]
-    flat = pieces.histogram.reshape(count * exposures, -1)
-    light = pieces.brightness.astype(np.float64)
-    squares = pieces.features[..., TEXTURE].astype(np.float64) ** 2
-    strength = np.log(np.sqrt(squares.mean(axis=(1, 2))) + FLAT)
-    mean = pieces.features[..., MEAN].astype(np.float64).mean(axis=(1, 2))
+    similar = common(target.histogram, pieces.histogram.reshape(count * exposures, -1)).reshape(-1, count, exposures)
+    light = pieces.brightness.astype(np.float32)
+    squares = pieces.features[..., TEXTURE].astype(np.float32) ** 2
+    strength = np.log(np.sqrt(squares.mean(axis=(1, 2))) + np.float32(FLAT))
+    mean = pieces.features[..., MEAN].astype(np.float32).mean(axis=(1, 2))
     limit = min(settings.candidates, count)
     piece, exposure = (np.zeros((len(target.brightness), limit), np.int64) for _ in range(2))
     data, angle = np.full(piece.shape, np.inf), np.zeros(len(piece))
     for p in range(len(piece)):
         allowed, angle[p] = _allowed(mean, _of_node(wanted, p), limit)
-        rows = (allowed[:, None] * exposures + np.arange(exposures)).ravel()
-        similar = common(target.histogram[p:p + 1], flat[rows])[0].reshape(-1, exposures).astype(np.float64)
-        texture = np.abs(strength[allowed] - np.log(target.texture[p] + FLAT)).mean(axis=1)
-        value = (1 - similar + settings.texture * texture[:, None]
-                 + settings.brightness * np.abs(light[allowed] - target.brightness[p]) / 255)
+        texture = np.abs(strength[allowed] - np.log(target.texture[p] + FLAT).astype(np.float32)).mean(axis=1)
+        value = (1 - similar[p, allowed] / np.float32(TOTAL) + np.float32(settings.texture) * texture[:, None]
+                 + np.float32(settings.brightness / 255) * np.abs(light[allowed] - np.float32(target.brightness[p])))
         best = value.argmin(axis=1)
         order = _limited(value.min(axis=1), database.clip[allowed], limit, settings.of_one_clip)
         piece[p, :len(order)], exposure[p, :len(order)] = allowed[order], best[order]
