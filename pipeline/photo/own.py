@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,10 +14,8 @@ LEAST, MOST = 8, 480
 """Frames of a clip."""
 SMALLEST, LARGEST = 64, 640
 """Pixels: the least side of a clip, and the longer side to which larger ones are scaled; the paper's are 640 x 480."""
-CUT = 4.0
-"""A cut: a frame that differs from the next so many times as much as half of them do."""
-STILL, CALM = 0.025, 0.5
-"""Mean grey levels between two frames: of a picture, and of the calmest water that a cut is known in."""
+STILL = 0.25
+"""Mean grey levels between the darkest and the brightest that a pixel becomes: of a picture, however it was coded."""
 LASTS = 1.5
 """How many times longer or shorter than most a frame lasts that is out of time."""
 OUT_OF_TIME = 0.05
@@ -38,7 +35,7 @@ def read_own(file: Path, at: str) -> OwnClip:
     `at` is the key of the scene, for the error. Raises BadInput for one that is no use: too short or too small, of a
     frame rate that varies, where nothing moves, with a cut, by a camera that moves.
     """
-    from synth.photo.checks import SHAKEN, camera
+    from synth.photo.checks import SHAKEN, camera, cut
 
     read = video.read_timed(file, at, MOST, LARGEST)
     count, rows, columns = read.luma.shape
@@ -47,11 +44,11 @@ def read_own(file: Path, at: str) -> OwnClip:
     if min(rows, columns) < SMALLEST:
         raise BadInput(file, at, f"has {columns} x {rows} pixels; a clip has at least {SMALLEST} a side")
     fps = _rate(file, at, read.times)
-    steps = np.array([np.abs(other - one.astype(np.int16)).mean() for one, other in itertools.pairwise(read.luma)])
-    if steps.max() <= STILL:
+    if np.ptp(read.luma, axis=0).mean() <= STILL:
         raise BadInput(file, at, "nothing moves in it")
-    if steps.max() > CUT * max(float(np.median(steps)), CALM):
-        raise BadInput(file, at, f"has a cut after frame {int(steps.argmax()) + 1}")
+    before = cut(read.luma)
+    if before:
+        raise BadInput(file, at, f"has a cut after frame {before}")
     shift = camera(read.luma)
     if shift > SHAKEN:
         raise BadInput(file, at, f"the camera moves, by {shift:.1f} pixels a frame")
