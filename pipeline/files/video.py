@@ -172,19 +172,22 @@ def _upright(path: Path, most: int, edge: int) -> Iterator[tuple[np.ndarray, flo
             raise ValueError("no video in it")
         stream = container.streams.video[0]
         there, count = 0, 0
-        for packet in container.demux(stream):
-            there += packet.size > 0
-            if packet.is_corrupt:
-                raise ValueError("damaged or cut short")
-            for frame in packet.decode():
-                if count == most:
-                    raise ValueError(f"more than {most} frames; cut the clip")
-                count += 1
-                scale = min(1.0, edge / max(frame.width, frame.height))
-                width, height = (max(1, round(n * scale)) for n in (frame.width, frame.height))
-                matrix = frame.side_data.get("DISPLAYMATRIX")
-                shown = frame.to_ndarray(format="rgb24", width=width, height=height, interpolation="AREA")
-                yield _turned(shown, None if matrix is None else np.frombuffer(bytes(matrix), np.int32)), frame.time
+        try:
+            for packet in container.demux(stream):
+                there += packet.size > 0
+                if packet.is_corrupt:
+                    raise ValueError("damaged or cut short")
+                for frame in packet.decode():
+                    if count == most:
+                        raise ValueError(f"more than {most} frames; cut the clip")
+                    count += 1
+                    scale = min(1.0, edge / max(frame.width, frame.height))
+                    width, height = (max(1, round(n * scale)) for n in (frame.width, frame.height))
+                    matrix = frame.side_data.get("DISPLAYMATRIX")
+                    shown = frame.to_ndarray(format="rgb24", width=width, height=height, interpolation="AREA")
+                    yield _turned(shown, None if matrix is None else np.frombuffer(bytes(matrix), np.int32)), frame.time
+        except av.error.FFmpegError as error:
+            raise ValueError("damaged or cut short") from error
         if there < stream.frames:
             raise ValueError(f"cut short: {there} of its {stream.frames} frames are there")
 
