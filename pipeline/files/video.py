@@ -165,7 +165,7 @@ def _upright(path: Path, most: int, edge: int) -> Iterator[tuple[np.ndarray, flo
 
     try:
         container = av.open(str(path))
-    except av.error.InvalidDataError as error:
+    except (av.error.InvalidDataError, av.error.EOFError) as error:
         raise ValueError("damaged, or no video") from error
     with container:
         if not container.streams.video:
@@ -181,21 +181,23 @@ def _upright(path: Path, most: int, edge: int) -> Iterator[tuple[np.ndarray, flo
                     if count == most:
                         raise ValueError(f"more than {most} frames; cut the clip")
                     count += 1
-                    scale = min(1.0, edge / max(frame.width, frame.height))
-                    width, height = (max(1, round(n * scale)) for n in (frame.width, frame.height))
-                    matrix = frame.side_data.get("DISPLAYMATRIX")
-                    shown = frame.to_ndarray(format="rgb24", width=width, height=height, interpolation="AREA")
-                    yield _turned(shown, None if matrix is None else np.frombuffer(bytes(matrix), np.int32)), frame.time
+                    yield _shown(frame, edge), frame.time
         except av.error.FFmpegError as error:
             raise ValueError("damaged or cut short") from error
         if there < stream.frames:
             raise ValueError(f"cut short: {there} of its {stream.frames} frames are there")
 
 
-def _turned(picture: np.ndarray, matrix: np.ndarray | None) -> np.ndarray:
-    """A picture as its display matrix (9 numbers, by rows; ISO 14496-12 §8.3.2) shows it, to a right angle."""
-    if matrix is None:
+def _shown(frame: Any, edge: int) -> np.ndarray:
+    """The pixels (h, w, 3) uint8 of a decoded frame, scaled down to `edge`, turned and mirrored by its display matrix
+    (9 numbers, by rows; ISO 14496-12 §8.3.2), to a right angle."""
+    scale = min(1.0, edge / max(frame.width, frame.height))
+    width, height = (max(1, round(n * scale)) for n in (frame.width, frame.height))
+    picture: np.ndarray = frame.to_ndarray(format="rgb24", width=width, height=height, interpolation="AREA")
+    stored = frame.side_data.get("DISPLAYMATRIX")
+    if stored is None:
         return picture
+    matrix = np.frombuffer(bytes(stored), np.int32)
     (xx, yx), (xy, yy) = matrix[:2].tolist(), matrix[3:5].tolist()  # xy: how x of the shown depends on y of the stored
     if abs(xx) + abs(yy) < abs(xy) + abs(yx):
         picture, xx, yy = picture.swapaxes(0, 1), xy, yx
