@@ -5,7 +5,7 @@ Pictures are in linear light, top row first; synth.photo has display values, the
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -33,18 +33,33 @@ def _database(inputs: Inputs, index: list[str]) -> Any:
         return Database.joined([Index(**inputs.read(name)) for name in index], inputs.read("codebook")["words"])
 
 
-def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index: list[str],
+def _frames(inputs: Inputs, clips: list[str]) -> Callable[[int], np.ndarray]:
+    """The frames of each clip, read when they are wanted."""
+    read: dict[int, np.ndarray] = {}
+
+    def luma(number: int) -> np.ndarray:
+        if number not in read:
+            read[number] = inputs.read(clips[number])["luma"]
+        return read[number]
+
+    return luma
+
+
+def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index: list[str], clips: list[str],
                     ) -> Iterator[tuple[int, arrays.Arrays]]:
     """Which piece of which clip is shown where (§5), and the motion."""
     from synth.photo.animate import motion
     from synth.photo.assign import assign
+    from synth.photo.fit import fitted
 
     target, database, cut = read_target(scene), _database(inputs, index), _cut(scene)
     of, found = assign(target.grey, target.fluid, database, cut, target.wanted, scene.assignment.settings())
     shown = found.shown(database)
+    if scene.assignment.energy == "mended":
+        shown = fitted(target.grey, of, shown, found.exposure, _frames(inputs, clips), cut)
     yield 0, {"node": of.corner, "edges": of.edges, "across": of.across, "clip": shown.clip, "version": shown.version,
-              "corner": shown.corner, "cells": shown.motion, "exposure": found.exposure, "angle": found.angle,
-              "energies": np.array(found.energies), "motion": motion(target, of, shown, cut)}
+              "corner": shown.corner, "cells": shown.motion, "fit": shown.fit, "exposure": found.exposure,
+              "angle": found.angle, "energies": np.array(found.energies), "motion": motion(target, of, shown, cut)}
 
 
 def widened(scene: PhotoScene, assignment: arrays.Arrays) -> str:
@@ -70,19 +85,13 @@ def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list
 
     target, cut, kept = read_target(scene), _cut(scene), inputs.read("assignment")
     of = Nodes(kept["node"], kept["edges"], kept["across"])
-    shown = Shown(kept["clip"], kept["version"], kept["corner"], kept["cells"])
-    read: dict[int, np.ndarray] = {}
-
-    def luma(number: int) -> np.ndarray:
-        if number not in read:
-            read[number] = inputs.read(clips[number])["luma"]
-        return read[number]
-
+    shown = Shown(kept["clip"], kept["version"], kept["corner"], kept["cells"], kept["fit"])
     box = target.box(cut.size)
     part = target.part(box)
     moved = of._replace(corner=of.corner - [box[0].start, box[1].start])
     rows, columns = part.matte.shape
-    more = differences(moved, shown, luma, (rows, columns), cut, scene.frames, scene.seed)
+    more = differences(moved, shown, _frames(inputs, clips), (rows, columns), cut, scene.frames, scene.seed,
+                       scene.photo.blending)
     look = Look(scene.photo.carried, scene.photo.feature, scene.photo.strength, scene.photo.matching)
     whole = target.picture.copy()
     for frame, picture in enumerate(composed(part, more, kept["motion"][box], look, scene.seed), start=1):
@@ -144,8 +153,8 @@ def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     clips, index = names(scene, "clip"), names(scene, "index")
     made = [
         Artifact("assignment", "synth", arrays.ARRAYS, ("photo", "assignment"),
-                 (("codebook", "once"), *((name, "once") for name in index)), make_assignment, {"index": index},
-                 animated=False, check=check_target, note=widened),
+                 (("codebook", "once"), *((name, "once") for name in (*index, *clips))), make_assignment,
+                 {"index": index, "clips": clips}, animated=False, check=check_target, note=widened),
         Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
                  (("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
         Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (("fluid", "every"),), make_mattes),

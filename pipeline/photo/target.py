@@ -24,7 +24,6 @@ def read_target(scene: PhotoScene) -> Any:
     Raises BadInput for a file that is no use, InvalidValue for strokes that are none.
     """
     from synth.photo.animate import Target
-    from synth.photo.assign import Wanted
 
     photo = scene.photo
     read = pictures.read_scaled(photo.file, "photo.file", photo.width, 1.0, LARGEST)
@@ -41,9 +40,7 @@ def read_target(scene: PhotoScene) -> Any:
     if frozen is not None and not (inside & ~frozen).any():
         raise BadInput(scene.photo.frozen or "", "photo.frozen", "covers all of the matte")
     background = _background(scene, read.of, picture, matte)
-    speed = None if photo.speed is None else np.float32(photo.fastest) * _mask(
-        scene, photo.speed, "photo.speed", read.of)
-    return Target(picture, matte, background, frozen, Wanted(_orientation(scene, read.of, frozen), speed))
+    return Target(picture, matte, background, frozen, _wanted(scene, read.of, frozen))
 
 
 def _background(scene: PhotoScene, shape: tuple[int, int], picture: np.ndarray, matte: np.ndarray) -> np.ndarray | None:
@@ -73,13 +70,25 @@ def _lowest_first(picture: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(picture[::-1], np.float32)
 
 
-def _orientation(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray | None) -> np.ndarray | None:
-    """The orientation map of the strokes, which are in pixels of the file from its upper left."""
-    from synth.photo.guides import orientation
+def _wanted(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray | None) -> Any:
+    """What the user wants of the motion, by strokes, by their speeds, by a speed map."""
+    from synth.photo.assign import Wanted
+    from synth.photo.guides import orientation, speeds
 
     photo = scene.photo
-    if not photo.strokes:
-        return None
+    size = (max(1, round(shape[0] * photo.width / shape[1])), photo.width)
+    strokes = _strokes(scene, shape)
+    speed = None
+    if photo.speeds:
+        speed = speeds(strokes, photo.speeds, size, frozen)
+    elif photo.speed is not None:
+        speed = np.float32(photo.fastest) * _mask(scene, photo.speed, "photo.speed", shape)
+    return Wanted(orientation(strokes, size, frozen) if strokes else None, speed)
+
+
+def _strokes(scene: PhotoScene, shape: tuple[int, int]) -> list[np.ndarray]:
+    """The strokes, in the file in pixels from its upper left, in pixels of the output, y up."""
+    photo = scene.photo
     scale = photo.width / shape[1]
     height = max(1, round(shape[0] * scale))
     strokes = []
@@ -91,7 +100,7 @@ def _orientation(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray |
             raise InvalidValue(f"photo.strokes[{number}]", "has no length")
         placed = (points + 0.5) * scale - 0.5
         strokes.append(np.stack([placed[:, 0], height - 1 - placed[:, 1]], axis=-1))
-    return orientation(strokes, (height, photo.width), frozen)
+    return strokes
 
 
 def check_target(scene: PhotoScene) -> None:

@@ -26,6 +26,7 @@ Then the database (§4), the assignment (§5) and the synthesis (§6):
     guides      strokes to an orientation map (fig. 8)
     minimize    minimizers of an energy over labels: TRW-S, α-expansion, ICM (Eq. 4)
     assign      a piece of a clip for each piece of the target (Eqs. 2 to 6)
+    fit         pieces fitted to the edges of the target
     integrate   differences from averages, blended band by band; the motion field (fig. 9)
     appearance  the average image, gains, histograms: the look of the target
     photograph  the photograph carried along the motion (beyond the paper)

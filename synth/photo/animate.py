@@ -23,7 +23,7 @@ from synth.photo.integrate import Differences, motion_field
 from synth.photo.motion import optical_flow
 from synth.photo.pieces import Cut
 
-CALMED = 0.35
+CALMED = 0.5
 """What of the differences is left, of their full strength, where the photograph is carried in full: it moves itself."""
 REGION = 64
 """Pixels of a region in which histograms are matched."""
@@ -39,13 +39,14 @@ class Look:
     feature   size of what moves, as streaks, ripples and billows, pixels: what is larger stands
     strength  of the differences
     matching  "gains": by the strength of bands, over all time, for fire and smoke; "histograms": frame by frame and
-              region by region as in the paper, for water; "none"
+              region by region, for water; "regions": as in the paper, differences added as they are and regions
+              side by side; "none"
     """
 
-    carried: float = 0.85
+    carried: float = 1.0
     feature: float = 10.0
     strength: float = 1.0
-    matching: Literal["gains", "histograms", "none"] = "gains"
+    matching: Literal["gains", "histograms", "regions", "none"] = "gains"
 
     def __post_init__(self) -> None:
         if not 0 <= self.carried <= 1 or self.strength < 0 or self.feature < 1:
@@ -125,13 +126,14 @@ def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, s
     grey = fluid.mean(axis=2)
     strength = look.strength * (1 - look.carried * (1 - CALMED))
     # 2. differences
-    scale = (np.full_like(more.bands[:, 0], 1 / 255) if look.matching == "none"
-             else gains(grey, more.bands, target.fluid))
+    as_they_are = look.matching in ("none", "regions")
+    scale = (np.full_like(more.bands[:, 0], 1 / 255) if as_they_are else gains(grey, more.bands, target.fluid))
     for frame, moved in enumerate(moving):
         ground = (1 - look.carried) * still + look.carried * moved
-        shown = added(ground, (scale * more.bands[:, frame]).sum(axis=0) * strength)
-        if look.matching == "histograms":
-            wanted = matched(shown.mean(axis=2), grey, target.fluid, REGION)
+        change = (scale * more.bands[:, frame]).sum(axis=0) * strength
+        shown = np.clip(ground + change[..., None], 0, 1) if look.matching == "regions" else added(ground, change)
+        if look.matching in ("histograms", "regions"):
+            wanted = matched(shown.mean(axis=2), grey, target.fluid, REGION, look.matching == "histograms")
             shown = added(shown, wanted - shown.mean(axis=2))
         yield shown
 

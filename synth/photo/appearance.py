@@ -112,17 +112,19 @@ def added(ground: np.ndarray, more: np.ndarray) -> np.ndarray:
                     1 - (1 - ground) * brighter[..., None]).astype(np.float32)
 
 
-def matched(frame: np.ndarray, target: np.ndarray, matte: np.ndarray, region: int) -> np.ndarray:
+def matched(frame: np.ndarray, target: np.ndarray, matte: np.ndarray, region: int, overlapping: bool = True,
+            ) -> np.ndarray:
     """A frame (Y, X) with the target's (Y, X) histograms of bands and values, region by region [Heeger, Bergen 1995].
 
     "We divide the image space into regular grids and apply the process to each region independently." Regions of
-    `region` pixels overlap by half with windows that add up to one, or their lattice would show.
+    `region` pixels overlap by half with windows that add up to one, or their lattice would show, as the paper's does.
     """
     ours, theirs = bands(frame[None].astype(np.float32)), bands(target[None].astype(np.float32))
     total, share = np.zeros(frame.shape), np.zeros(frame.shape)
-    ramp = np.sin(np.pi * (np.arange(region) + 0.5) / region) ** 2
-    for y in range(-(region // 2), frame.shape[0], region // 2):
-        for x in range(-(region // 2), frame.shape[1], region // 2):
+    ramp, step = (np.sin(np.pi * (np.arange(region) + 0.5) / region) ** 2, region // 2) if overlapping else (
+        np.ones(region), region)
+    for y in range(step - region, frame.shape[0], step):
+        for x in range(step - region, frame.shape[1], step):
             low, left = max(y, 0), max(x, 0)
             part = np.s_[low:y + region, left:x + region]
             inside = matte[part] > 0.5

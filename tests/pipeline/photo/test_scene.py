@@ -29,6 +29,9 @@ def test_a_table_photo_makes_it_a_scene_of_them(tmp_path: Path) -> None:
     ("panel = 32", "panel = 32\nmoments = [9]", "figure.moments[0]: the animation has 8 frames"),
     ("width = 96", "width = 20", "photo.width: should be greater than or equal to 64, not 20"),
     ("width = 96", "width = 96\ndynamics = 1.0", "photo.dynamics: should be less than 1, not 1.0"),
+    ("width = 96", "width = 96\nspeeds = [1, 2, 3]", "photo.speeds: has 3 speeds, and there are 2 strokes"),
+    ("width = 96", 'width = 96\nspeeds = [1, 2]\nspeed = "assets/stream/mask.png"',
+     "photo.speeds: and photo.speed both say how fast it flows: leave out one"),
     ("piece = 16", "piece = 40", "assignment.piece: should be a multiple of 16, not 40"),
 ])
 def test_what_does_not_fit_is_one_line(tmp_path: Path, old: str, new: str, told: str) -> None:

@@ -58,6 +58,11 @@ def test_a_speed_map_says_the_speed_and_a_frozen_part_stands(tmp_path: Path) -> 
     assert target.fluid[24, 16] == 0 and target.fluid[4, 16] == 1
 
 
+def test_a_stroke_may_have_a_speed(tmp_path: Path) -> None:
+    target = read_target(scene(own(tmp_path), changed(OWN, "width = 96", "width = 96\nspeeds = [2.5]")))
+    np.testing.assert_allclose(target.wanted.speed, 2.5, atol=1e-5)
+
+
 @pytest.mark.parametrize(("picture", "matte", "told"), [
     (None, np.zeros(SHAPE), r"m\.png: photo\.matte: is empty"),
     (None, np.ones((60, 100)), r"m\.png: photo\.matte: has 100 x 60 pixels, and the picture 120 x 60"),

@@ -26,7 +26,7 @@ def target():
 def shown(of, velocity):
     count = len(of.corner)
     return Shown(np.zeros(count, int), np.zeros(count, int), np.zeros((count, 2), int),
-                 np.broadcast_to(np.float32(velocity), (count, CELLS, CELLS, 2)))
+                 np.broadcast_to(np.float32(velocity), (count, CELLS, CELLS, 2)), np.zeros(count, int))
 
 
 def differences(strength=12.0):

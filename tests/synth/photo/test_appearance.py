@@ -99,6 +99,13 @@ def test_a_matched_frame_has_the_targets_values_and_no_lattice():
     assert lines == pytest.approx(1, abs=0.1)
 
 
+def test_regions_side_by_side_show_a_lattice():
+    ramp = np.linspace(-0.2, 0.2, SHAPE[1], dtype=np.float32)
+    found = matched(0.5 + ramp + 0.02 * grain(2), 0.4 + 0.1 * grain(3), np.ones(SHAPE, np.float32), 32, False)
+    step = np.abs(np.diff(found, axis=1))
+    assert step[:, 31::32].mean() / np.delete(step, np.s_[31::32], axis=1).mean() > 1.2
+
+
 def test_what_lies_outside_the_matte_is_not_matched():
     matte = np.zeros(SHAPE, np.float32)
     matte[:, :40] = 1
