@@ -66,7 +66,8 @@ FOUND: dict[str, dict[str, Any]] = {
                 "against the reference": {"size": "256²", "ours": TIMES, "reference": TIMES,
                                           "largest difference": 0.0}},
     "loops": {"period": 120, "loops": [{"texture": name, **LOOP} for name in TEXTURES]},
-    "photo": {"look": [{"target": "stream", **FLOWING},
+    "photo": {"database": {"clips": 150, "size": "320 × 240", "frames": 96}, "pieces": 190000,
+              "look": [{"target": "stream", **FLOWING},
                        {"target": "river", **FLOWING, "edges": 0.97, "edges, no mask": 0.8},
                        {"target": "river", **FLOWING, "way": "the clip itself", "edges": 0.99},
                        {"target": "stream", **FLOWING, "way": "differences alone", "low-pass": 9.0, "loop": None}],
@@ -227,3 +228,10 @@ def test_another_way_is_shown_beside_ours_of_the_same_targets_and_sets_no_target
     assert row.met is None
     assert row.measured.startswith("low-pass 9.0") and row.measured.endswith("loop nan")
     assert row.reference.startswith("ours: low-pass 3.1")
+
+
+def test_a_small_database_meets_no_target_of_time_or_memory() -> None:
+    small = FOUND["photo"] | {"times": FOUND["photo"]["times"] | {"clips": 16}}
+    rows = {row.what: row for row in targets.photo(small)}
+    timed = [row for what, row in rows.items() if "16 clips" in what or "analysis" in what or "memory" in what]
+    assert [row.met for row in timed] == [None] * 3
