@@ -194,7 +194,8 @@ def turns(shape: tuple[int, int], seed: int) -> np.ndarray:
     A whole number more is another life, which begins elsewhere: so it is a number, not an angle.
     """
     random = np.random.Generator(np.random.Philox(key=[seed, 1]))
-    smooth = ndimage.gaussian_filter(random.standard_normal(shape), SCATTER, mode="nearest")
+    # any other border would repeat single numbers of the noise
+    smooth = ndimage.gaussian_filter(random.standard_normal(shape), SCATTER, mode="wrap")
     turn = SPREAD * (smooth - smooth.mean()) / max(float(smooth.std()), 1e-12)
     return (turn - np.floor(turn.min())).astype(np.float32)
 

@@ -77,7 +77,7 @@ def test_all_ages_are_alike_and_neighbours_are_near():
     counts = np.histogram(found % 1, 10, (0, 1))[0] / found.size
     assert found.min() >= 0
     assert counts.min() > 0.05
-    assert np.abs(np.diff(found, axis=1)).max() < 0.25
+    assert np.abs(np.diff(found, axis=1)).max() < 0.15
 
 
 def test_a_frame_has_no_cracks():
