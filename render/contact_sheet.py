@@ -3,31 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from render.layout import Panel, figure, fitted
-from synth.photo.clip import Clip
 
 GAP = 2
 """Pixels between thumbnails."""
 
 
-def panels(name: str, clip: Clip, width: int) -> list[Panel]:
-    """Frames 0, T / 3 and 2 T / 3 of a clip and the mean of its frames, `width` pixels wide; the first has the name."""
-    frames = clip.chroma if clip.chroma is not None else np.repeat(clip.luma[..., None], 3, axis=-1)
+def panels(name: str, frames: np.ndarray, width: int) -> list[Panel]:
+    """Frames 0, T / 3 and 2 T / 3 of a clip and the mean of its frames, `width` pixels wide; the first has the name.
+
+    frames  (T, Y, X) grey or (T, Y, X, 3) sRGB, uint8, row 0 the lowest
+    """
     length = len(frames)
     mean = np.rint(frames.mean(0, dtype=np.float64)).astype(np.uint8)
     chosen = [frames[0], frames[length // 3], frames[2 * length // 3], mean]
     # row 0 of a clip is the lowest, of a picture the highest
-    return [Panel(fitted(np.ascontiguousarray(frame[::-1]), width), label)
-            for frame, label in zip(chosen, (name, "", "", "mean"), strict=True)]
+    pictures = [np.broadcast_to(frame.reshape(*frame.shape[:2], -1), (*frame.shape[:2], 3))[::-1] for frame in chosen]
+    return [Panel(fitted(np.ascontiguousarray(picture), width), label)
+            for picture, label in zip(pictures, (name, "", "", "mean"), strict=True)]
 
 
-def contact_sheet(clips: Sequence[tuple[str, Clip]], width: int = 160, beside: int = 2) -> np.ndarray:
+def contact_sheet(clips: Iterable[tuple[str, np.ndarray]], width: int = 160, beside: int = 2) -> np.ndarray:
     """All clips with their names on one sheet, (h, w, 3) uint8 sRGB.
 
+    clips   names and frames, as of `panels`, one at a time in memory
     width   of each panel, pixels
     beside  clips in a row of the sheet
     """

@@ -3,8 +3,11 @@
 In the order data passes through them:
 
     tables      the tables of a scene but its clips
+    own         a user's own clips, read from videos and checked
+    library     own clips in a folder: flowloom clips add, list
     clips       [clips]: the clips of the database, made or a user's, and their index; artifacts clip-fall-01,
                 index-fall-01 …
+    sheet       clips to be looked at: flowloom clips sheet
     target      the photograph, its matte, what stands still in it, what the user wants
     frames      synth: the assignment, the motion, the frames and their mattes
     outputs     what a compositor or a paint program takes: the motion, the speed map

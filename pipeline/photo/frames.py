@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.build.artifact import Artifact, Inputs
+from pipeline.errors import attributed_to
 from pipeline.files import arrays, images
 from pipeline.photo.clips import names
 from pipeline.photo.tables import PhotoScene
@@ -29,7 +30,8 @@ def _database(inputs: Inputs, index: list[str]) -> Any:
     from synth.photo.assign import Database
     from synth.photo.index import Index
 
-    return Database.joined([Index(**inputs.read(name)) for name in index], inputs.read("codebook")["words"])
+    with attributed_to("clips"):
+        return Database.joined([Index(**inputs.read(name)) for name in index], inputs.read("codebook")["words"])
 
 
 def frames_of(inputs: Inputs, clips: list[str]) -> Callable[[int], np.ndarray]:
@@ -68,6 +70,19 @@ def assigned(inputs: Inputs) -> tuple[Any, Any]:
     kept = inputs.read("assignment")
     return (Nodes(kept["node"], kept["edges"], kept["across"]),
             Shown(kept["clip"], kept["version"], kept["corner"], kept["cells"], kept["fit"]))
+
+
+def widened(scene: PhotoScene, assignment: arrays.Arrays) -> str:
+    """What is said where pieces of the clips that move as wanted were too few; "" where they were not."""
+    from synth.photo.assign import ANGLES
+
+    angle = assignment["angle"]
+    wide = int((angle > ANGLES[0]).sum())
+    guides = " and ".join(name for name, there in (("the strokes", scene.photo.strokes),
+                                                   ("the speed map", scene.photo.speed)) if there)
+    return "" if not wide else (
+        f"clips: {wide} of {len(angle)} pieces of the picture found too few candidates within {ANGLES[0]:.0f} degrees "
+        f"of {guides}; the angle was widened, to {angle.max():.0f} at most")
 
 
 def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
@@ -131,7 +146,7 @@ def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     return (
         Artifact("assignment", "synth", arrays.ARRAYS, ("photo", "assignment"),
                  (("codebook", "once"), *((name, "once") for name in (*index, *clips))), make_assignment,
-                 {"index": index, "clips": clips}, animated=False, check=check_target),
+                 {"index": index, "clips": clips}, animated=False, check=check_target, note=widened),
         Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
                  (("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
         Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (("fluid", "every"),), make_mattes),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import get_args
 
 from pipeline.build.method import Faults
+from pipeline.errors import BadInput
 from pipeline.photo.clips import Clips, names
 from pipeline.photo.tables import Assignment, Figure, OfPiece, Photo, PhotoScene
 from pipeline.tables import key
@@ -26,8 +27,12 @@ def photo_fits(scene: Scene) -> Faults:
     unknown = [family for family in scene.clips.families if family not in _families()]
     if unknown:
         yield "clips.families", f"there is no family {unknown[0]!r}, only {', '.join(_families())}"
-    elif not scene.clips.recipes() and not scene.clips.files:
-        yield "clips.count", "is 0, and clips.files is empty: there is no clip"
+    elif not scene.clips.recipes() and not scene.clips.files and scene.clips.library is None:
+        yield "clips.count", "is 0, and there is neither clips.files nor clips.library: there is no clip"
+    try:
+        _ = scene.clips.kept
+    except BadInput as error:
+        yield "clips.library", error.reason
     if scene.clips.count and scene.assignment.piece >= min(scene.clips.size) // 2:
         yield "assignment.piece", (f"pieces of {scene.assignment.piece} pixels do not fit into clips of "
                                    f"{scene.clips.size[0]} x {scene.clips.size[1]} at half their size")

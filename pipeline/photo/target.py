@@ -12,7 +12,8 @@ from pipeline.files import pictures
 from pipeline.photo.tables import PhotoScene
 
 LARGEST = 8192
-"""Edge of a photograph, pixels."""
+"""Edge of a photograph, pixels, upright."""
+SMALLEST = 16
 FULL = 0.5
 """Grey from which a mask holds."""
 
@@ -25,25 +26,21 @@ def read_target(scene: PhotoScene) -> Any:
     from synth.photo.animate import Target
 
     photo = scene.photo
-    picture = pictures.read_foreign(photo.file, "photo.file")
-    shape = (picture.shape[0], picture.shape[1])
-    if max(shape) > LARGEST:
-        raise BadInput(photo.file, "photo.file", f"has {shape[1]} x {shape[0]} pixels; {LARGEST} a side are the most")
-    if min(shape) < 16:
-        raise BadInput(photo.file, "photo.file", f"has {shape[1]} x {shape[0]} pixels: too few to show a fluid")
-    matte = _mask(scene, photo.matte, "photo.matte", shape)
-    if not (matte >= FULL).any():
+    read = pictures.read_scaled(photo.file, "photo.file", photo.width, 1.0, LARGEST)
+    if min(read.of) < SMALLEST:
+        raise BadInput(photo.file, "photo.file", f"has {read.of[1]} x {read.of[0]} pixels: too few to show a fluid")
+    picture = _lowest_first(read.picture)
+    matte = _mask(scene, photo.matte, "photo.matte", read.of)
+    inside = matte >= FULL
+    if not inside.any():
         raise BadInput(photo.matte, "photo.matte", "is empty: nothing is white, so there is nothing to animate")
-    small = _scaled(scene, picture)
-    if np.ptp(small[_scaled(scene, matte[..., None])[..., 0] >= FULL], axis=0).max(initial=0) <= 1 / 255:
+    if np.ptp(picture[inside], axis=0).max(initial=0) <= 1 / 255:
         raise BadInput(photo.file, "photo.file", "is of one colour inside the matte")
-    frozen = None if photo.frozen is None else _scaled(scene, _mask(scene, photo.frozen, "photo.frozen", shape)[
-        ..., None])[..., 0] >= FULL
-    if frozen is not None and not ((_scaled(scene, matte[..., None])[..., 0] >= FULL) & ~frozen).any():
+    frozen = None if photo.frozen is None else _mask(scene, photo.frozen, "photo.frozen", read.of) >= FULL
+    if frozen is not None and not (inside & ~frozen).any():
         raise BadInput(scene.photo.frozen or "", "photo.frozen", "covers all of the matte")
-    background = _background(scene, shape, small, _scaled(scene, matte[..., None])[..., 0])
-    wanted = _wanted(scene, shape, frozen)
-    return Target(small, _scaled(scene, matte[..., None])[..., 0], background, frozen, wanted)
+    background = _background(scene, read.of, picture, matte)
+    return Target(picture, matte, background, frozen, _wanted(scene, read.of, frozen))
 
 
 def _background(scene: PhotoScene, shape: tuple[int, int], picture: np.ndarray, matte: np.ndarray) -> np.ndarray | None:
@@ -52,33 +49,27 @@ def _background(scene: PhotoScene, shape: tuple[int, int], picture: np.ndarray, 
 
     file = scene.photo.background
     if file is not None:
-        at = "photo.background"
-        return _scaled(scene, _of_size(pictures.read_foreign(file, at), file, at, shape))
+        return _lowest_first(_of_size(scene, file, "photo.background", shape, 1.0))
     return inpainted(picture, matte) if scene.photo.dynamics > 0 else None
 
 
-def _of_size(picture: np.ndarray, file: Path, at: str, shape: tuple[int, int]) -> np.ndarray:
-    if picture.shape[:2] != shape:
-        raise BadInput(file, at, f"has {picture.shape[1]} x {picture.shape[0]} pixels, and the picture "
-                                 f"{shape[1]} x {shape[0]}")
-    return picture
+def _of_size(scene: PhotoScene, file: Path, at: str, shape: tuple[int, int], ground: float, kernel: str = "",
+             ) -> np.ndarray:
+    """A picture of the photograph's size, at the scene's: (h, w, 3), top row first."""
+    read = pictures.read_scaled(file, at, scene.photo.width, ground, LARGEST, kernel)
+    if read.of != shape:
+        raise BadInput(file, at, f"has {read.of[1]} x {read.of[0]} pixels, and the picture {shape[1]} x {shape[0]}")
+    return read.picture
 
 
 def _mask(scene: PhotoScene, file: Path, at: str, shape: tuple[int, int]) -> np.ndarray:
-    """A grey picture (h, w), top row first, of the photograph's size."""
-    grey: np.ndarray = _of_size(pictures.read_foreign(file, at), file, at, shape) @ pictures.LUMA
-    return grey
-
-
-def _scaled(scene: PhotoScene, picture: np.ndarray) -> np.ndarray:
-    """A picture (h, w, C), top row first, at the scene's width, lowest row first: float32, 0..1."""
+    """A grey picture of the photograph's size, at the scene's: (Y, X) float32. What is transparent is black."""
     # beside the border of a mask an overshoot would be fluid
-    kernel = "triangle" if picture.shape[2] == 1 else ""
-    width = scene.photo.width
-    height = max(1, round(picture.shape[0] * width / picture.shape[1]))
-    same = picture.shape[1] == width
-    resized = picture if same else pictures.resized(picture.astype(np.float32), width, height, kernel)
-    return np.ascontiguousarray(np.clip(resized, 0, 1)[::-1], np.float32)
+    return _lowest_first(np.clip(_of_size(scene, file, at, shape, 0.0, "triangle") @ pictures.LUMA, 0, 1))
+
+
+def _lowest_first(picture: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(picture[::-1], np.float32)
 
 
 def _wanted(scene: PhotoScene, shape: tuple[int, int], frozen: np.ndarray | None) -> Any:

@@ -27,6 +27,8 @@ CALMED = 0.5
 """What of the differences is left, of their full strength, where the photograph is carried in full: it moves itself."""
 REGION = 64
 """Pixels of a region in which histograms are matched."""
+THIN = 0.2
+"""The least matte by which the fluid can be told from what is behind it."""
 TOWARDS = 0.9
 """Share of the wanted direction in the motion that the photograph is carried by; the rest is that of the pieces."""
 
@@ -91,6 +93,21 @@ class Target:
                       Wanted(*(cut(values) for values in self.wanted)))
 
     @property
+    def shows(self) -> np.ndarray:
+        """Where the picture shows enough of the fluid to read it: (Y, X) bool. With a background it is known what else
+        a soft matte shows."""
+        return np.asarray(self.fluid > (0.5 if self.background is None else THIN))
+
+    @property
+    def foreground(self) -> np.ndarray:
+        """The fluid's own colours (Y, X, 3) float32, everywhere: the picture without what is behind it, and beyond the
+        fluid those that are nearest."""
+        if self.background is None:
+            return extended(self.picture, self.shows)
+        alpha = np.maximum(self.matte, THIN)[..., None]
+        return extended(np.clip((self.picture - (1 - alpha) * self.background) / alpha, 0, 1), self.shows)
+
+    @property
     def grey(self) -> np.ndarray:
         """(Y, X) uint8, what descriptors see."""
         return np.rint(255 * np.clip(self.picture.mean(axis=2), 0, 1)).astype(np.uint8)
@@ -118,10 +135,10 @@ def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, s
     2. The differences, matched to the target.
     """
     length = more.bands.shape[1]
-    fluid = extended(target.picture, target.matte)
+    fluid = target.foreground
     # 1. ground
     still = average(fluid, moves) if look.carried < 1 else fluid
-    moving = (photograph.frames(fluid, moves, length, seed, look.feature, target.fluid > 0.5)
+    moving = (photograph.frames(fluid, moves, length, seed, look.feature, target.shows)
               if look.carried > 0 else repeat(still, length))
     grey = fluid.mean(axis=2)
     strength = look.strength * (1 - look.carried * (1 - CALMED))

@@ -80,7 +80,8 @@ def split(picture: np.ndarray, motion: np.ndarray, feature: float, fluid: np.nda
     squares = (detail.mean(axis=2, dtype=np.float64) ** 2).astype(np.float32)
     strength = np.sqrt(np.maximum(_smooth(squares[..., None], STRENGTH * feature, free)[..., 0], 0)) + FAINT
     unit = np.clip(detail / strength[..., None], -MOST, MOST).astype(np.float32)
-    return Split(ground, unit[mirrored(fluid)], strength)
+    beyond = mirrored(fluid)
+    return Split(ground, unit[beyond], strength[beyond])
 
 
 def mirrored(fluid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -202,7 +203,7 @@ def frames(picture: np.ndarray, motion: np.ndarray, length: int, seed: int, feat
     """The `length` frames of a picture (Y, X, 3) float32 carried along motion (Y, X, 2), a loop: (Y, X, 3) float32.
 
     feature  size of what moves, as streaks, ripples and billows, pixels: what is larger stands
-    fluid    (Y, X) bool: where the fluid is. The rest is shown as it is, and nothing is read from it
+    fluid    (Y, X) bool: where the fluid is; nothing is read from the rest
 
     1. What stands and what moves.
     2. Where each pixel was; when its life begins, how long it is, where detail begins.
@@ -224,7 +225,7 @@ def frames(picture: np.ndarray, motion: np.ndarray, length: int, seed: int, feat
     scale = _restored(of, [carried(device, length * k // SAMPLES) for k in range(SAMPLES)], feature)[..., None]
     # 3. frames
     for frame in range(length):
-        yield np.where(fluid[..., None], of.ground + scale * carried(device, frame), picture)
+        yield of.ground + scale * carried(device, frame)
 
 
 def _restored(of: Split, moved: list[np.ndarray], feature: float) -> np.ndarray:

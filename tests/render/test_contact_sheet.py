@@ -3,15 +3,13 @@
 import numpy as np
 
 from render.contact_sheet import GAP, contact_sheet, panels, thumbnails
-from synth.photo.clip import Clip
 
 
 def clip(frames=6, coloured=False):
     luma = np.zeros((frames, 12, 16), np.uint8)
     luma[:] = np.arange(frames)[:, None, None] * 30
     luma[:, 0] = 255  # the lowest row
-    chroma = np.stack([luma, luma // 2, luma // 4], -1) if coloured else None
-    return Clip(luma, np.zeros((12, 16, 2), np.float32), np.ones((12, 16), np.float32), chroma)
+    return np.stack([luma, luma // 2, luma // 4], -1) if coloured else luma
 
 
 def test_panels_are_three_frames_and_the_mean():

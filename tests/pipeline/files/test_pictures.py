@@ -116,7 +116,7 @@ def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match=reason):
             pictures.write(tmp_path / "a.png", picture)
     huge = png(tmp_path / "huge.png", np.zeros((1, pictures.LARGEST + 1), np.uint8), 0)
-    with pytest.raises(BadInput, match="the largest side read"):
+    with pytest.raises(BadInput, match="16384 a side are the most"):
         pictures.read_foreign(huge, "exemplar.file")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["huge.png"]
 
@@ -162,3 +162,16 @@ def test_the_triangle_kernel_does_not_overshoot(size: tuple[int, int], scaled: t
     np.testing.assert_array_equal(small[:, :middle - reach], 0)
     np.testing.assert_allclose(small[:, middle + reach:], 1, atol=1e-6)
     assert (np.diff(small, axis=1) >= -1e-6).all()
+
+
+def test_a_picture_many_times_as_large_is_averaged_before_it_is_filtered(tmp_path: Path) -> None:
+    """A ramp stays one, in its place; grain of single pixels becomes its mean."""
+    ramp = np.linspace(0, 1, 1003)[None, :, None] * np.ones((701, 1, 3))
+    grain = np.random.default_rng(1).random((701, 1003, 1)) * 0.2 - 0.1
+    pictures.write(tmp_path / "a.png", (0.8 * ramp + 0.1 + grain).astype(np.float32))
+    read = pictures.read_scaled(tmp_path / "a.png", "photo.file", 20, 1.0, 2000)
+    assert read.of == (701, 1003) and read.picture.shape == (14, 20, 3)
+    expected = 0.8 * (np.arange(20) + 0.5) / 20 + 0.1
+    np.testing.assert_allclose(read.picture[7, 2:-2, 1], expected[2:-2], atol=0.005)
+    with pytest.raises(BadInput, match=r"a\.png: photo\.file: has 1003 x 701 pixels; 1000 a side are the most"):
+        pictures.read_scaled(tmp_path / "a.png", "photo.file", 20, 1.0, 1000)

@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import footage
 import numpy as np
 import pytest
 from tiny import PHOTO, changed, complaint, written
 
-from pipeline.files import pictures, video
+from pipeline.files import pictures
+from pipeline.photo import library
 from pipeline.scene import load
 from pipeline.tables import PROJECT_SCENES
 
@@ -18,7 +20,8 @@ def test_a_table_photo_makes_it_a_scene_of_them(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("old", "new", "told"), [
-    ("count = 1", "count = 0", "clips.count: is 0, and clips.files is empty: there is no clip"),
+    ("count = 1", "count = 0", "clips.count: is 0, and there is neither clips.files nor clips.library: there is "
+                                  "no clip"),
     ("piece = 16", "piece = 32", "assignment.piece: pieces of 32 pixels do not fit into clips of 64 x 64 at half their "
                                  "size"),
     ('["cloud"]', '["clouds"]', "clips.families: there is no family 'clouds', only fall, white-water, river, fire, "
@@ -38,14 +41,16 @@ def test_what_does_not_fit_is_one_line(tmp_path: Path, old: str, new: str, told:
 
 
 def test_the_readmes_example_is_a_whole_scene(tmp_path: Path) -> None:
-    text = (PROJECT_SCENES / "README.md").read_text().split("## Scenes of photographs\n")[1].split("\n## ")[0]
-    example = [line.removeprefix("    ") for line in text.splitlines() if line.startswith("    ")]
+    text = (PROJECT_SCENES / "README.md").read_text().split("## Scenes of photographs\n")[1]
+    example = [line.removeprefix("    ") for line in text.split("\nThe clips are made")[0].splitlines()
+               if line.startswith("    ")]
     for name in ("brook.jpg", "water.png"):
         pictures.write(tmp_path / name, np.full((340, 400, 3), 0.5, np.float32))
-    video.write(tmp_path / "pond.mp4", [np.zeros((32, 32, 3), np.uint8)] * 2, 24)
+    library.add(footage.write(tmp_path / "pond.mp4", footage.falling()), tmp_path / "clips")
     one = load(written(tmp_path, 'title = "A brook"\n' + "\n".join(example))).variants[""]
     assert len(one.photo.strokes) == 2
     assert len(one.clips.recipes()) == 65
+    assert [file.name for file in one.clips.kept] == ["pond.npz"]
 
 
 @pytest.mark.parametrize("panel", ["strokes", "orientation"])
