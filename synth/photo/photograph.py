@@ -32,8 +32,8 @@ LIFE = 24.0
 """The longest life, frames, about."""
 HALVINGS = 2
 """The shortest life is the longest over 2 to this power."""
-SCATTER = 24.0
-"""σ, pixels, of the noise by which lives begin at different times."""
+SCATTER = 6.0
+"""σ of the noise by which lives begin at different times, in sizes of a feature: a smaller one would stretch detail."""
 SPREAD = 1.0
 """Deviation of the times at which lives begin, in lives: all ages are then about as frequent."""
 STEPS_A_PIXEL = 1.0
@@ -188,14 +188,14 @@ def paths(motion: np.ndarray, life: int) -> np.ndarray:
     return np.stack(found)
 
 
-def turns(shape: tuple[int, int], seed: int) -> np.ndarray:
+def turns(shape: tuple[int, int], feature: float, seed: int) -> np.ndarray:
     """How many of its lives the first copy of each pixel has lived at frame 0: (Y, X) float32, smooth, from 0 on.
 
     A whole number more is another life, which begins elsewhere: so it is a number, not an angle.
     """
     random = np.random.Generator(np.random.Philox(key=[seed, 1]))
     # any other border would repeat single numbers of the noise
-    smooth = ndimage.gaussian_filter(random.standard_normal(shape), SCATTER, mode="wrap")
+    smooth = ndimage.gaussian_filter(random.standard_normal(shape), SCATTER * feature, mode="wrap")
     turn = SPREAD * (smooth - smooth.mean()) / max(float(smooth.std()), 1e-12)
     return (turn - np.floor(turn.min())).astype(np.float32)
 
@@ -232,7 +232,7 @@ def frames(picture: np.ndarray, motion: np.ndarray, length: int, seed: int, feat
     far = np.minimum(AWAY * np.minimum(speed * np.interp(place, np.arange(len(lived)), lived), feature), inland(fluid))
     carry = Carrying(
         np.pad(of.detail, ((0, 0), (0, 0), (0, 1))), paths(motion, int(np.ceil(lived[0]))),
-        np.stack([turns(motion.shape[:2], seed), place, far, np.zeros_like(far)], axis=-1).astype(np.float32),
+        np.stack([turns(motion.shape[:2], feature, seed), place, far, np.zeros_like(far)], axis=-1).astype(np.float32),
         lived, starts(lived, length, seed), length, OWN * feature)
     device = carry.on_device()
     scale = _restored(of, [carried(device, length * k // SAMPLES) for k in range(SAMPLES)], feature)[..., None]

@@ -73,7 +73,7 @@ def test_paths_in_a_vortex_keep_their_distance_from_its_middle():
 
 
 def test_all_ages_are_alike_and_neighbours_are_near():
-    found = turns((300, 400), 3)
+    found = turns((300, 400), 4, 3)
     counts = np.histogram(found % 1, 10, (0, 1))[0] / found.size
     assert found.min() >= 0
     assert counts.min() > 0.05
