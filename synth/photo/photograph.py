@@ -194,9 +194,11 @@ def turns(shape: tuple[int, int], feature: float, seed: int) -> np.ndarray:
     A whole number more is another life, which begins elsewhere: so it is a number, not an angle.
     """
     random = np.random.Generator(np.random.Philox(key=[seed, 1]))
+    width = SCATTER * feature
     # any other border would repeat single numbers of the noise
-    smooth = ndimage.gaussian_filter(random.standard_normal(shape), SCATTER * feature, mode="wrap")
-    turn = SPREAD * (smooth - smooth.mean()) / max(float(smooth.std()), 1e-12)
+    smooth = ndimage.gaussian_filter(random.standard_normal(shape), width, mode="wrap")
+    # such a noise deviates by 1 / (2 √π width)
+    turn = SPREAD * 2 * np.sqrt(np.pi) * width * smooth
     return (turn - np.floor(turn.min())).astype(np.float32)
 
 
