@@ -17,6 +17,11 @@ from pipeline.photo.tables import PhotoScene
 from pipeline.photo.target import check_target, read_target
 
 
+def _target(scene: PhotoScene, inputs: Inputs) -> Any:
+    """The synth.photo.animate.Target, of a file or made."""
+    return read_target(scene, inputs.read("made") if "made" in inputs else None)
+
+
 def _cut(scene: PhotoScene) -> Any:
     from synth.photo.pieces import Cut
 
@@ -37,7 +42,7 @@ def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index:
     from synth.photo.animate import motion
     from synth.photo.assign import assign
 
-    target, database, cut = read_target(scene), _database(inputs, index), _cut(scene)
+    target, database, cut = _target(scene, inputs), _database(inputs, index), _cut(scene)
     of, found = assign(target.grey, target.fluid, database, cut, target.wanted, scene.assignment.settings())
     shown = found.shown(database)
     yield 0, {"node": of.corner, "edges": of.edges, "across": of.across, "clip": shown.clip, "version": shown.version,
@@ -53,7 +58,7 @@ def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list
     from synth.photo.assign import Nodes, Shown
     from synth.photo.integrate import differences
 
-    target, cut, kept = read_target(scene), _cut(scene), inputs.read("assignment")
+    target, cut, kept = _target(scene, inputs), _cut(scene), inputs.read("assignment")
     of = Nodes(kept["node"], kept["edges"], kept["across"])
     shown = Shown(kept["clip"], kept["version"], kept["corner"], kept["cells"])
     read: dict[int, np.ndarray] = {}
@@ -84,7 +89,7 @@ def make_mattes(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterato
     """The matte of each frame (h, w, 3), which moves with scene.photo.dynamics."""
     from synth.photo.animate import mattes
 
-    target = read_target(scene)
+    target = _target(scene, inputs)
     fluid = np.stack([np.rint(255 * np.clip(_display(inputs, frame).mean(axis=2), 0, 1)).astype(np.uint8)
                       for frame in range(1, scene.frames + 1)])
     found = mattes(target, fluid, scene.photo.dynamics)
@@ -97,7 +102,7 @@ def make_frames(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterato
     from render import tonemap
     from synth.photo.animate import over_background
 
-    target = read_target(scene)
+    target = _target(scene, inputs)
     for frame in frames:
         matte = np.ascontiguousarray(inputs.read("mattes", frame)[::-1, :, 0])
         picture = over_background(target, _display(inputs, frame), matte)
@@ -108,7 +113,7 @@ def make_target_picture(scene: PhotoScene, inputs: Inputs, frames: list[int]) ->
     """The photograph."""
     from render import tonemap
 
-    target = read_target(scene)
+    target = _target(scene, inputs)
     yield 0, tonemap.from_srgb(target.picture)[::-1].astype(np.float32)
 
 
@@ -122,16 +127,19 @@ def make_motion_picture(scene: PhotoScene, inputs: Inputs, frames: list[int]) ->
 def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """All after the clips."""
     clips, index = names(scene, "clip"), names(scene, "index")
+    target = () if scene.photo.made is None else (("made", "once"),)
     made = [
         Artifact("assignment", "synth", arrays.ARRAYS, ("photo", "assignment"),
-                 (("codebook", "once"), *((name, "once") for name in index)), make_assignment, {"index": index},
+                 (*target, ("codebook", "once"), *((name, "once") for name in index)), make_assignment, {"index": index},
                  animated=False, check=check_target),
         Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
-                 (("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
-        Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (("fluid", "every"),), make_mattes),
-        Artifact("frames", "synth", images.LIGHT, ("photo",), (("fluid", "same"), ("mattes", "same")), make_frames)]
+                 (*target, ("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
+        Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (*target, ("fluid", "every")), make_mattes),
+        Artifact("frames", "synth", images.LIGHT, ("photo",), (*target, ("fluid", "same"), ("mattes", "same")),
+                 make_frames)]
     if "target" in scene.figure.panels:
-        made.append(Artifact("target", "render", images.LIGHT, ("photo",), (), make_target_picture, animated=False))
+        made.append(Artifact("target", "render", images.LIGHT, ("photo",), target, make_target_picture,
+                             animated=False))
     if "motion" in scene.figure.panels:
         made.append(Artifact("motion", "render", images.LIGHT, ("figure.panel",), (("assignment", "once"),),
                              make_motion_picture, animated=False))

@@ -6,6 +6,7 @@ from pipeline.build.artifact import Artifact
 from pipeline.build.method import Method
 from pipeline.photo.clips import clip_artifacts
 from pipeline.photo.frames import frame_artifacts
+from pipeline.photo.made import made_artifacts
 from pipeline.photo.panels import panels
 from pipeline.photo.scene import Scene, photo_fits
 from pipeline.photo.tables import PhotoScene
@@ -13,7 +14,7 @@ from pipeline.photo.tables import PhotoScene
 
 def artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """All artifacts of a scene, each after those it is made from."""
-    return *clip_artifacts(scene), *frame_artifacts(scene)
+    return *made_artifacts(scene), *clip_artifacts(scene), *frame_artifacts(scene)
 
 
 METHOD = Method("okabe11", "photo", Scene, (photo_fits,), artifacts, panels)

@@ -20,7 +20,8 @@ class Scene(PhotoScene):
 
 
 def photo_fits(scene: Scene) -> Faults:
-    """Check: a database that has clips, pieces that fit into them, moments there are."""
+    """Check: one target, a database that has clips, pieces that fit into them, moments there are."""
+    yield from _target_fits(scene)
     unknown = [family for family in scene.clips.families if family not in _families()]
     if unknown:
         yield "clips.families", f"there is no family {unknown[0]!r}, only {', '.join(_families())}"
@@ -32,6 +33,19 @@ def photo_fits(scene: Scene) -> Faults:
     for number, moment in enumerate(scene.figure.moments):
         if moment > scene.frames:
             yield f"figure.moments[{number}]", f"the animation has {scene.frames} frames"
+
+
+def _target_fits(scene: Scene) -> Faults:
+    """A file with its matte, or a made picture without files in their place."""
+    photo = scene.photo
+    if photo.made is None:
+        for name, file in (("file", photo.file), ("matte", photo.matte)):
+            if file is None:
+                yield f"photo.{name}", "is missing, and so is photo.made"
+    else:
+        for name, file in (("file", photo.file), ("matte", photo.matte), ("background", photo.background)):
+            if file is not None:
+                yield f"photo.{name}", f"is given, and so is photo.made = \"{photo.made}\", which has its own"
 
 
 def _families() -> list[str]:
