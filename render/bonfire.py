@@ -1,7 +1,7 @@
 """A bonfire at dusk: flames over logs in a ring of stones, before trees.
 
 The flames are ray-marched (`render.march`): Mitsuba has no medium that emits. What is round them is path-traced with
-lamps that are points drawn from the flames' own light, so that ground, stones and trees are lit as the fire lights them.
+lamps that are points drawn from the flames' own light: ground, stones and trees are lit as the fire lights them.
 
 World units: the flames' domain is 1 high, and the ground is at y = 0.
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy import ndimage
 
 from render import backend, lic, march, mitsuba_shapes, studio
 from render.film import Photograph, developed
@@ -26,7 +27,8 @@ BRIGHTNESS = 62.0  # of the hottest soot, where it hides what is behind
 SOOT = 14.0  # extinction of flames per world unit where glow is 1
 LAMPS = 28  # points of light that stand for the flames
 LIGHTS = 8.0  # how much more they light what is round them: a camera that shows both exposes between them
-HIDES = 3.2  # how fast the matte rises with the light of flames
+HIDES = 16.0  # how fast the matte rises with the light of flames: nearly all that is seen of them is theirs alone
+FIREFLY = 1.8  # most light of a pixel, in medians of those round it
 FARTHEST = 1e3
 SUBPIXELS = 2  # rays per pixel along each axis
 BED = 0.030  # level of the bed of embers
@@ -62,7 +64,9 @@ def photograph(glow: np.ndarray, heat: np.ndarray, ground: float, shot: studio.S
     scene = surroundings(mi, shot.seed) | _lamps(light, voxel, origin, shot.seed)
     scene["sensor"] = mitsuba_shapes.sensor(mi, camera, shot.width, shot.height) | {
         "type": "thinlens", "aperture_radius": APERTURE, "focus_distance": camera.distance}
-    behind = mitsuba_shapes.rendered(mi, scene, mi.load_dict({"type": "path", "max_depth": 4}), shot)
+    traced = mitsuba_shapes.rendered(mi, scene, mi.load_dict({"type": "path", "max_depth": 4}), shot)
+    # a path that meets a lamp at close quarters leaves a lone bright pixel
+    behind = np.minimum(traced, FIREFLY * ndimage.median_filter(traced, (3, 3, 1)))
     # 2. flames and embers, along more rays
     rays, hits, distance = _first_hits(mi, scene, camera, shot)
     source = np.concatenate([light * voxel, (SOOT * voxel * glow)[..., None]], -1)
@@ -81,14 +85,14 @@ def photograph(glow: np.ndarray, heat: np.ndarray, ground: float, shot: studio.S
 def _lamps(light: np.ndarray, voxel: float, origin: np.ndarray, seed: int) -> dict[str, Any]:
     """Points of light drawn from the flames' own: each gives the same share of it, in the colour of all."""
     strength = light.sum(axis=-1, dtype=np.float64).ravel()
-    total = LIGHTS * light.reshape(-1, 3).sum(axis=0, dtype=np.float64) * voxel**3
+    red, green, blue = LIGHTS * light.reshape(-1, 3).sum(axis=0, dtype=np.float64) * voxel**3 / LAMPS
     random = np.random.Generator(np.random.Philox(key=[seed, 82]))
     steps = (np.arange(LAMPS) + random.random(LAMPS)) / LAMPS
     chosen = np.searchsorted(np.cumsum(strength) / strength.sum(), steps)
     z, y, x = np.unravel_index(np.minimum(chosen, strength.size - 1), light.shape[:3])
     places = origin + voxel * np.stack([x, y, z], -1)
     return {f"lamp-{number}": {"type": "point", "position": [float(c) for c in place],
-                               "intensity": mitsuba_shapes.rgb(tuple(float(c) for c in total / LAMPS))}
+                               "intensity": mitsuba_shapes.rgb((float(red), float(green), float(blue)))}
             for number, place in enumerate(places)}
 
 
@@ -148,7 +152,7 @@ def _grid(rows: int, columns: int) -> np.ndarray:
 
 def _fractal(points: np.ndarray, size: float, octaves: int, seed: int) -> np.ndarray:
     """Noise (N,) at points (N, D) of octaves that fall by half."""
-    return sum(0.5**k * gradient_noise([*(points.T * (2**k / size))], seed + k) for k in range(octaves))
+    return np.sum([0.5**k * gradient_noise([*(points.T * (2**k / size))], seed + k) for k in range(octaves)], axis=0)
 
 
 def _ground(seed: int) -> tuple[studio.Mesh, np.ndarray]:

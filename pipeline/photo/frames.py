@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.build.artifact import Artifact, Inputs
+from pipeline.build.artifact import Artifact, Inputs, Needs
 from pipeline.files import arrays, images
 from pipeline.photo.clips import names
 from pipeline.photo.tables import PhotoScene
@@ -127,11 +127,11 @@ def make_motion_picture(scene: PhotoScene, inputs: Inputs, frames: list[int]) ->
 def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """All after the clips."""
     clips, index = names(scene, "clip"), names(scene, "index")
-    target = () if scene.photo.made is None else (("made", "once"),)
+    target: Needs = () if scene.photo.made is None else (("made", "once"),)
     made = [
         Artifact("assignment", "synth", arrays.ARRAYS, ("photo", "assignment"),
-                 (*target, ("codebook", "once"), *((name, "once") for name in index)), make_assignment, {"index": index},
-                 animated=False, check=check_target),
+                 (*target, ("codebook", "once"), *((name, "once") for name in index)), make_assignment,
+                 {"index": index}, animated=False, check=check_target),
         Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
                  (*target, ("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
         Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (*target, ("fluid", "every")), make_mattes),

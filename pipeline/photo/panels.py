@@ -5,7 +5,6 @@ from __future__ import annotations
 from pipeline.build.method import Panel
 from pipeline.photo.tables import PhotoScene
 
-
 MOVING = {"result": "frame", "matte": "matte of frame"}
 """Panels that the still shows at each moment, and what it calls them."""
 

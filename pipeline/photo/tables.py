@@ -30,7 +30,7 @@ class Photo(Table):
                                    "inpainted", None)
     strokes: Annotated[tuple[Stroke, ...], Strict(False)] = key(
         "strokes along the flow, from their first point to their last, each an array of points [x, y] of the file, "
-        "from its upper left corner (§5, figure 8); none: those of a made picture, else the clips alone decide", (), max_length=1000)
+        "from its upper left corner (§5, figure 8); none: a made picture's, or none", (), max_length=1000)
     speed: Asset | None = key("a grey picture of the same size, the speed map (§5, figure 8): black rests, white is "
                               "photo.fastest; none: the clips alone decide", None)
     fastest: float = key("speed where the speed map is white", 4.0, "pixels of the output per frame", gt=0, le=100)

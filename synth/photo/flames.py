@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from synth.photo.rising import Rising, Texture, rising, simulated
 from synth.photo.tiles import rng, smooth_step
@@ -52,4 +53,6 @@ def flames(seed: int, rows: int) -> Flames:
     left = 1 - risen.age / lasts
     sheets = np.exp(-2.4 * np.abs(fold))
     burning = smooth_step(0.0, 0.16, left) * smooth_step(0.0, 3.0, risen.age)
-    return Flames(burning * (0.08 + sheets**2), np.clip(left, 0, 1) * (0.75 + 0.25 * sheets), risen)
+    # the cells of the simulation must not show
+    glow = ndimage.gaussian_filter(burning * (0.08 + sheets**2), 0.7)
+    return Flames(glow, np.clip(left, 0, 1) * (0.75 + 0.25 * sheets), risen)

@@ -70,7 +70,8 @@ def painted(layout: Layout, seed: int) -> np.ndarray:
 
 def _places(canvas: np.ndarray, wanted: np.ndarray, width: float, tolerance: float,
             random: np.random.Generator) -> np.ndarray:
-    """Where a layer sets its strokes (N, 2), y and x, in random order: on a jittered lattice, where the canvas is off."""
+    """Where a layer sets its strokes (N, 2), y and x, in random order: on a jittered lattice where the canvas is
+    off."""
     step = SPACING * width
     rows, columns = (max(1, round(n / step)) for n in canvas.shape[:2])
     lattice = np.stack(np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"), -1).reshape(-1, 2)
@@ -225,8 +226,8 @@ def landscape(seed: int, shape: tuple[int, int]) -> tuple[Layout, np.ndarray]:
         outline = 1 - ((x - cx) / (1.5 * size)) ** 2 - ((y - cy) / size) ** 2 + 0.25 * texture(0.03, 0.7)
         where = smooth_step(-0.06, 0.06, outline)
         lit = np.clip(0.45 - 0.5 * (x - cx) / size + 0.5 * (y - cy) / size + 0.25 * texture(0.02, 0.5), 0, 1)
-        layout.lay(where, mixed((0.0, (0.10, 0.09, 0.11)), (0.5, (0.34, 0.29, 0.27)), (1.0, (0.80, 0.64, 0.47)), by=lit),
-                   0.5 + 0.6 * texture(0.05))
+        tones = mixed((0.0, (0.10, 0.09, 0.11)), (0.5, (0.34, 0.29, 0.27)), (1.0, (0.80, 0.64, 0.47)), by=lit)
+        layout.lay(where, tones, 0.5 + 0.6 * texture(0.05))
         stones = np.maximum(stones, where)
     edge = 0.085 + 0.22 * np.abs((x - valley) / (0.62 * wide)) ** 3 + crest(0.0, 0.016, 0.04, 0.4)
     grass = texture((0.012, 0.07), 0.5) + 0.6 * texture(0.15, 1.0)

@@ -41,8 +41,9 @@ class Plume:
 def plume(seed: int, rows: int) -> Plume:
     """A plume at one moment, for a picture of `rows` rows, on DETAIL times as many cells along each axis as are
     simulated."""
-    risen = rising(simulated(CELLS, rows), seed, frames=FRAMES, ground=MOUTH, draught=0.003, radius=RADIUS, height=MOUTH,
-                   buoyancy=1.7e-3, cooling=0.006, confinement=0.7, sway=0.8, sway_period=18.0).enlarged(DETAIL)
+    risen = rising(simulated(CELLS, rows), seed, frames=FRAMES, ground=MOUTH, draught=0.003, radius=RADIUS,
+                   height=MOUTH, buoyancy=1.7e-3, cooling=0.006, confinement=0.7, sway=0.8,
+                   sway_period=18.0).enlarged(DETAIL)
     heads = Texture(rng(seed, 75), 0.09, 24.0, falloff=0.7).left(risen)
     there = risen.density + 0.22 * heads * np.sqrt(np.clip(risen.density, 0, 1))
     return _leaning(smooth_step(0.04, 0.55, there), risen)
