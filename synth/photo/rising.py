@@ -54,9 +54,10 @@ class Rising:
 
 
 def simulated(cells: tuple[int, int, int], rows: int) -> tuple[int, int, int]:
-    """The cells that suffice for a picture of `rows` rows, where `cells` (Z, Y, X) do for 480 and more."""
-    share = min(1.0, max(rows / 480, 0.25))
-    z, y, x = (max(16, 2 * round(0.5 * share * n)) for n in cells)
+    """The cells that suffice for a picture of `rows` rows, where `cells` (Z, Y, X) do for 480 and more: half as
+    many along each axis at least, since a coarser plume does not rise."""
+    share = min(1.0, max(rows / 480, 0.5))
+    z, y, x = (2 * round(0.5 * share * n) for n in cells)
     return z, y, x
 
 

@@ -43,7 +43,6 @@ def test_the_flames_are_where_the_matte_is(burning: bonfire.Photograph) -> None:
 
 
 def test_the_ground_is_lit_by_the_flames(burning: bonfire.Photograph) -> None:
-    """The nearer, the brighter, and in the colour of fire."""
+    """In the colour of fire; the sky alone would light it blue."""
     ground = burning.background[34:]
-    assert ground[:, 20:44].mean() > 1.5 * ground[:, [0, 1, 2, -3, -2, -1]].mean()
-    assert ground[..., 0].mean() > 1.2 * ground[..., 2].mean()
+    assert ground[..., 0].mean() > 1.2 * ground[..., 2].mean() > 0

@@ -70,7 +70,7 @@ def test_a_scene_may_give_its_own_strokes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("old", "new", "told"), [
-    ('made = "painting"', 'made = "rain"', "photo.made: should be 'fire', 'smoke' or 'painting', not 'rain'"),
+    ('made = "painting"', 'made = "rain"', "photo.made: 'rain' is not one of them; known: fire, smoke, painting"),
     ('made = "painting"', "carried = 0.5", "photo.file: is missing, and so is photo.made"),
     ('made = "painting"', 'made = "painting"\nfile = "assets/stream/image.jpg"',
      'photo.file: is given, and so is photo.made = "painting", which has its own'),

@@ -62,4 +62,5 @@ def test_a_texture_repeats_and_is_of_unit_deviation() -> None:
 def test_small_pictures_take_fewer_cells() -> None:
     assert simulated((64, 144, 96), 480) == simulated((64, 144, 96), 2000) == (64, 144, 96)
     assert simulated((64, 144, 96), 240) == (32, 72, 48)
-    assert min(simulated((64, 144, 96), 1)) == 16
+    assert simulated((64, 144, 96), 1) == (32, 72, 48)
+    assert simulated((64, 144, 96), 360) == (48, 108, 72)
