@@ -6,6 +6,7 @@ prints tables, writes each part's section of bench/RESULTS.md, and out/bench.jso
     machine      what it is all measured on, and the revision
     flows        the coarse motions L of the tables
     plot         curves as an SVG
+    fluid        measures of a picture that flows: its look, its motion, its pieces, its loop
 
     synthesis    ma09 2-D: time, memory, and the speed-up over the reference
     reference    the same synthesis in plain NumPy and SciPy
@@ -22,6 +23,8 @@ prints tables, writes each part's section of bench/RESULTS.md, and out/bench.jso
     fidelity     ma13: statistics of every scene beside those of its exemplar
     texture      wang05: likeness to the sample, motion, time, growth, memory, and rlic beside it
     loops        wang05: how the last frame of a loop leads into the first
+    photo        okabe11: look, motion and loop, truth, minimizers, time, memory, the same bits
+    subjects     okabe11: targets on which the method was not tuned
 
     targets      rows of each part: the measured number, its target, the paper's or a peer's number
     results      the rows as Markdown, in the part's own section of RESULTS.md

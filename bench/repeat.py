@@ -69,12 +69,12 @@ def digest() -> str:
     return found.hexdigest()
 
 
-def elsewhere(threads: int, cache: str) -> str:
-    """The digest of a new process with this many threads and this folder of kernels."""
+def elsewhere(threads: int, cache: str, module: str = "bench.repeat") -> str:
+    """The digest of a new process of a module of the bench, with this many threads and this folder of kernels."""
     environment = os.environ | {"POCL_MAX_PTHREAD_COUNT": str(threads), "OMP_NUM_THREADS": str(threads),
-                                "POCL_CACHE_DIR": cache}
-    child = subprocess.run([sys.executable, "-m", "bench.repeat", "digest"], env=environment, check=True,
-                           capture_output=True, text=True)
+                                "OPENCV_FOR_THREADS_NUM": str(threads), "POCL_CACHE_DIR": cache}
+    child = subprocess.run([sys.executable, "-m", module, "digest"], env=environment, check=True, capture_output=True,
+                           text=True)
     return child.stdout.strip()
 
 

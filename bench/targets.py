@@ -234,25 +234,30 @@ def loops(found: dict[str, Any]) -> Iterable[Row]:
 
 def _look(whose: str, frames: list[dict[str, Any]], motion: list[dict[str, Any]]) -> Iterable[Row]:
     """What is asked of all textures alike: the worst of them against its target, and how many meet it."""
-    def worst(rows: list[dict[str, Any]], what: str, keys: tuple[str, ...], low: float | None, high: float, unit: str,
-              shown: Callable[[float], str]) -> Row:
-        least = -math.inf if low is None else low
-        values = [(row[key], key, row) for row in rows for key in keys]
-        value, key, row = max(values, key=lambda v: (math.isnan(v[0]), max(least - v[0], v[0] - high)))
-        names = {r["texture"] for r in rows}
-        good = len(names - {r["texture"] for v, _, r in values if not least <= v <= high})
-        where = f"{row['texture']}, frame {row['frame']}" if "frame" in row else row["texture"]
-        of = f"{key}, {where}" if len(keys) > 1 else where
-        target = f"≤ {shown(high)}{unit}" if low is None else f"{shown(low)} to {shown(high)}{unit}"
-        return Row(f"{whose}: {what}", f"worst {shown(value)}{unit} ({of}); {good} of {len(names)} within", target,
-                   least <= value <= high, NOT_REPORTED)
+    for rows, what, keys, low, high, unit, shown in (
+            (frames, "contrast and gradient over the sample's", ("std", "grad"), 0.85, 1.10, "", "{:.2f}"),
+            (frames, "histogram error", ("hist",), None, 0.10, "", "{:.2f}"),
+            (motion, "synthesised anew in a frame", ("synthesised anew, %",), None, 2, " %", "{:.2g}"),
+            (motion, "worst block", ("worst block",), None, 0.8, "", "{:.2f}"),
+            (motion, "drift of the backward distance", ("drift of bwd",), None, 0.02, "", "{:.3f}"),
+            (motion, "drift of the share that is used", ("drift of used",), None, 0.04, "", "{:.3f}")):
+        yield _worst(f"{whose}: {what}", rows, "texture", keys, low, high, unit, shown.format)
 
-    yield worst(frames, "contrast and gradient over the sample's", ("std", "grad"), 0.85, 1.10, "", "{:.2f}".format)
-    yield worst(frames, "histogram error", ("hist",), None, 0.10, "", "{:.2f}".format)
-    yield worst(motion, "synthesised anew in a frame", ("synthesised anew, %",), None, 2, " %", "{:.2g}".format)
-    yield worst(motion, "worst block", ("worst block",), None, 0.8, "", "{:.2f}".format)
-    yield worst(motion, "drift of the backward distance", ("drift of bwd",), None, 0.02, "", "{:.3f}".format)
-    yield worst(motion, "drift of the share that is used", ("drift of used",), None, 0.04, "", "{:.3f}".format)
+
+def _worst(what: str, rows: list[dict[str, Any]], subject: str, keys: tuple[str, ...], low: float | None, high: float,
+           unit: str, shown: Callable[[float], str], reference: str = NOT_REPORTED) -> Row:
+    """The row that is furthest from where it should be, named by its `subject`, and how many subjects are there. What
+    is no number is furthest of all."""
+    least = -math.inf if low is None else low
+    values = [(math.nan if row[key] is None else row[key], key, row) for row in rows for key in keys]
+    value, key, row = max(values, key=lambda v: (math.isnan(v[0]), max(least - v[0], v[0] - high)))
+    names = {r[subject] for r in rows}
+    good = len(names - {r[subject] for v, _, r in values if not least <= v <= high})
+    where = f"{row[subject]}, frame {row['frame']}" if "frame" in row else row[subject]
+    of = f"{key}, {where}" if len(keys) > 1 else where
+    target = f"≤ {shown(high)}{unit}" if low is None else f"{shown(low)} to {shown(high)}{unit}"
+    return Row(what, f"worst {shown(value)}{unit} ({of}); {good} of {len(names)} within", target,
+               least <= value <= high, reference)
 
 
 def _texture_times(found: dict[str, Any], by_paper: dict[str, dict[str, Any]]) -> Iterable[Row]:
@@ -280,7 +285,86 @@ def _texture_times(found: dict[str, Any], by_paper: dict[str, dict[str, Any]]) -
                          f"NumPy: {seconds(small['reference'])}; largest difference {small['largest difference']:g}")
 
 
+TELLING = ("fall", "fall over ledges", "fire", "smoke")
+"""Targets that tell which way they move: water falls, flames and smoke rise. A still river may flow either way."""
+
+
+def photo(found: dict[str, Any]) -> Iterable[Row]:
+    yield from _photo_look(found["look"])
+    yield from _photo_ways(found["look"])
+    for strokes, limit in (("without", 20), ("with", 15)):
+        rows = [row for row in found["truth"]
+                if row["strokes"] == strokes and (strokes == "with" or row["target"] in TELLING)]
+        what = f"a frame of a clip that the database has not, {strokes} strokes"
+        own = _average(rows, "angle of the clip's own flow")
+        yield _worst(f"{what}: angle to its true velocity", rows, "target", ("angle",), None, limit, "°",
+                     "{:.0f}".format, f"optical flow of the clips themselves: {own:.0f}° on average")
+        yield _worst(f"{what}: distance of log power spectra", rows, "target", ("spectrum",), None, 0.3, "",
+                     "{:.2f}".format)
+    for row in found["minimizers"]:
+        others = ", ".join(f"{name} {row[name]:g}" for name in ("α-expansion", "ICM", "data term alone"))
+        yield Row(f"{row['target']}, {row['nodes']} nodes: energy by TRW-S", f"{row['TRW-S']:g}",
+                  "≤ that by α-expansion", row["TRW-S"] <= row["α-expansion"], others)
+    yield from _photo_times(found)
+    different, runs = found["bits"]["different results"], found["bits"]["runs"]
+    yield at_most("same bits from clips to frames: again, 1 and 2 threads, cold and warm kernel cache",
+                  f"{different} different result{'s' if different > 1 else ''} in {runs} runs", different, 1)
+
+
+def _photo_look(rows: list[dict[str, Any]]) -> Iterable[Row]:
+    """The look, the direction, the pieces and the loop of all targets."""
+    for what, keys, low, high, unit, shown in (
+            ("mean frame and target, blurred by 8 pixels, of 255", ("low-pass",), None, 5, "", "{:.1f}"),
+            ("contrast of bands over the target's", ("1 px", "2 px", "4 px"), 0.85, 1.15, "", "{:.2f}"),
+            ("angle of the flow seen in the frames to the strokes", ("angle to strokes",), None, 15, "°", "{:.0f}"),
+            ("deviation between pieces over that at their centres", ("deviation",), 0.9, 1.1, "", "{:.2f}"),
+            ("gradient on the lines of pieces over that elsewhere", ("gradient",), 0.9, 1.1, "", "{:.2f}"),
+            ("correlation of gradients where the picture stands still", ("edges",), 0.9, 1, "", "{:.2f}"),
+            ("last to first over the median of frame differences", ("loop",), None, 1.2, "", "{:.2f}")):
+        ours, theirs = ([row for row in rows if row["way"] == way and (keys != ("edges",) or row["edges"] is not None)]
+                        for way in ("ours", "the clip itself"))
+        values = [row[key] for row in theirs for key in keys if row[key] is not None]
+        yield _worst(f"okabe11: {what}", ours, "target", keys, low, high, unit, shown.format,
+                     f"clips themselves: {shown.format(min(values))} to {shown.format(max(values))}{unit}")
+
+
+def _photo_ways(rows: list[dict[str, Any]]) -> Iterable[Row]:
+    """The numbers of other ways beside ours, averages over the targets that both are measured on."""
+    keys = (("low-pass", "low-pass {:.1f}"), ("1 px", "contrast {:.2f}"), ("2 px", "{:.2f}"), ("4 px", "{:.2f}"),
+            ("angle to strokes", "angle {:.0f}°"), ("deviation", "deviation {:.2f}"), ("gradient", "gradient {:.2f}"),
+            ("loop", "loop {:.2f}"))
+    for way in dict.fromkeys(row["way"] for row in rows if row["way"] != "ours"):
+        targets = [row["target"] for row in rows if row["way"] == way]
+        theirs, ours = (", ".join(shown.format(_average(
+            [row for row in rows if row["way"] == one and row["target"] in targets], key)) for key, shown in keys)
+            for one in (way, "ours"))
+        yield without_target(f"okabe11: {way}, mean of {len(targets)} targets", theirs, f"ours: {ours}")
+
+
+def _average(rows: list[dict[str, Any]], key: str) -> float:
+    """Of the numbers there are; nan if there are none."""
+    values = [row[key] for row in rows if row[key] is not None]
+    return mean(values) if values else math.nan
+
+
+def _photo_times(found: dict[str, Any]) -> Iterable[Row]:
+    times, files, analysed = found["times"], found["product"], found["analysis"]
+    whole = times["all, s"]
+    what = f"{times['size']}, fluid all over, {times['clips']} clips, {times['frames']} frames"
+    yield at_most(f"{what}: assignment, integration and composition",
+                  f"{whole:.1f} s (assignment {times['assignment, s']:.1f}, integration "
+                  f"{times['integration, s']:.1f}, composition {times['composition, s']:.1f})", whole, 36, "s",
+                  "the paper: 1 hour")
+    yield at_most("of it the assignment", f"{times['assignment, s']:.1f} s", times["assignment, s"], 15, "s")
+    yield at_most("peak memory", f"{times['peak memory MB']} MB", times["peak memory MB"], 3000, "MB")
+    yield without_target(f"flowloom synth on the stream, {files['width']} pixels wide, with its files", seconds(files))
+    minutes = analysed["wall"] / analysed["clips"] * 150 / 60
+    yield at_most("analysis of 150 clips of the database's size",
+                  f"{minutes:.1f} min ({analysed['clips']} of {analysed['of']} clips, {analysed['wall']:.0f} s, at "
+                  "that rate)", minutes, 10, "min")
+
+
 ROWS: dict[str, Callable[[dict[str, Any]], Iterable[Row]]] = {
     "synthesis": synthesis, "search": search, "density": density, "repeat": repeat, "solid": solid, "smoke": smoke,
     "quality": quality, "boundary": boundary, "potential": potential, "lagrangian": lagrangian, "elements": elements,
-    "fidelity": fidelity, "texture": texture, "loops": loops}
+    "fidelity": fidelity, "texture": texture, "loops": loops, "photo": photo}

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
 
-from pipeline.errors import EnvironmentMissing, FlowloomError, StorageFailed, Terminated
+from pipeline.errors import BadInput, EnvironmentMissing, FlowloomError, StorageFailed, Terminated
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -141,6 +141,64 @@ def schema(*, write: Annotated[bool, Parameter(negative="", help="Write them int
         page.write()
     else:
         print(page.json_schema())
+
+
+clips = App(name="clips", help="Clips of the database of photographs that flow: your own and those that are made.")
+app.command(clips)
+Library = Annotated[Path, Parameter(name="--into", help="The folder of clips of your own.")]
+OWN_CLIPS = Path("clips")
+
+
+@clips.command
+def add(*files: Annotated[Path, Parameter(help="Videos of fluids, by a fixed camera, without a cut.")],
+        library: Library = OWN_CLIPS, quiet: Quiet = False) -> int:
+    """Check videos and keep them as clips in a folder, which scenes name as clips.library; exit 2 if one is no use."""
+    from pipeline.photo.library import add as kept
+    from pipeline.progress import Progress
+
+    if not files:
+        raise BadInput("clips add", "", "names no video")
+    refused = 0
+    with Progress(quiet).task("clips add", len(files)) as advance:
+        for file in files:
+            try:
+                entry, is_new = kept(file, library)
+                print(f"{file}: {'is now' if is_new else 'is already'} {library / entry.name}")
+            except BadInput as error:
+                refused = _say(str(error), error.exit_code)
+            advance()
+    return refused
+
+
+@clips.command(name="list")
+def list_clips(*, library: Library = OWN_CLIPS) -> None:
+    """List the families that are made, and the clips of your own: frames, size, speed, share that moves."""
+    from pipeline.photo import library as keeping
+
+    print(keeping.made_line())
+    for line in keeping.lines(library):
+        print(line)
+
+
+@clips.command
+def sheet(scene: Annotated[Path | None, Parameter(help="A scene, whose clips are shown.")] = None, /, *,
+          library: Annotated[Path | None, Parameter(name="--into", help="A folder of clips, which are shown.")] = None,
+          png: Annotated[Path, Parameter(name="--out", help="The file to write.")] = Path("clips.png"),
+          quick: Quick = False, quiet: Quiet = False) -> None:
+    """Write a contact sheet of clips: of a scene, of a folder of your own, or without either of all that are made."""
+    from pipeline import stages
+    from pipeline.photo import sheet as page
+    from pipeline.progress import Progress
+    from pipeline.scene import load
+
+    if scene is not None and library is not None:
+        raise BadInput("clips sheet", "", "shows a scene or a folder, not both")
+    if scene is not None:
+        shown = page.of_scene(stages.graph_of(load(scene, quick), OUT), Progress(quiet))
+    else:
+        shown = page.of_catalogue(Progress(quiet)) if library is None else page.of_library(library)
+    page.write(png, shown)
+    print(png)
 
 
 @app.command(name="list")

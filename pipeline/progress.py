@@ -38,6 +38,11 @@ class Progress:
 
             yield advance
 
+    def note(self, line: str) -> None:
+        """Tell the user one line that needs no answer: on stderr, also in a log, but for a `quiet` run."""
+        if not self.quiet:
+            sys.stderr.write(f"{line}\n")
+
 
 def remaining(elapsed: float, made: int, left: int) -> float:
     """Seconds to go, from what this run alone has made: frames that were there before cost it nothing."""

@@ -35,6 +35,14 @@ def _inside_or_folder(name: Path, info: ValidationInfo) -> Path:
     return found
 
 
+def _inside_folder(name: Path, info: ValidationInfo) -> Path:
+    """The existing folder `name`, as `_inside_or_folder`."""
+    found = _inside_or_folder(name, info)
+    if not found.is_dir():
+        raise ValueError(f"'{name}' is not a folder")
+    return found
+
+
 def _there(name: Path, info: ValidationInfo) -> Path:
     if name.is_absolute() or ".." in name.parts:
         raise ValueError(f"'{name}' leaves the scene's folder; write a path relative to it, without ..")
@@ -66,6 +74,7 @@ def key(description: str, default: Any = ..., unit: str = "", **limits: Any) -> 
 
 
 Asset = Annotated[Path, Strict(False), AfterValidator(_inside)]
+Folder = Annotated[Path, Strict(False), AfterValidator(_inside_folder)]
 AssetOrFolder = Annotated[Path, Strict(False), AfterValidator(_inside_or_folder)]
 
 

@@ -27,6 +27,8 @@ In the order data passes through them:
     speed_map       speed as colour over a texture, and its legend
     layout          panels, labels, insets and legends as one figure
     contact_sheet   clips of fluids on one sheet
+    steps           inner steps of a photograph that flows: pieces, motion, strokes
+    plot            curves over axes
 
 Fields and densities have y up, row 0 the lowest; pictures have their top row first. Pictures are linear Rec.709 light,
 which `tonemap` turns into sRGB display values in [0, 1]; `lic` and `arrows` give display values at once.

@@ -52,6 +52,7 @@ class Artifact:
     check        check(scene) refuses what can be known to be wrong before anything is made, files of the user's above
                  all: raises BadInput or ValueError. It sees the whole scene, since it can only refuse
     check_frame  check_frame(scene, inputs, frame) refuses what shows when the inputs of a frame are there
+    note         note(scene, value): a line for the user on what was made, "" for none; a dotted key and what to know
     memory       memory(scene): bytes that make takes at its peak, an estimate from above, and the key that decides it
     """
 
@@ -69,6 +70,7 @@ class Artifact:
     shared: bool = False
     check: Callable[[Any], None] | None = None
     check_frame: Callable[[Any, Inputs, int], None] | None = None
+    note: Callable[[Any, Any], str] | None = None
     memory: Callable[[Any], tuple[float, str]] | None = None
 
     def __post_init__(self) -> None:

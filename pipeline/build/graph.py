@@ -227,13 +227,16 @@ class BuildGraph:
         if not missing:
             return
         label = f"{artifact.stage} {name}" + (f" ({variant})" if len(self.distinct_variants(name)) > 1 else "")
-        folder = self.folder(variant, name)
+        folder, notes = self.folder(variant, name), []
         with self._attributed_to(artifact), progress.task(label, len(asked), len(asked) - len(missing)) as advance:
             for frame, value in self.run(variant, name, missing):
                 file = self.file(variant, name, frame)
                 artifact.format.save(file, value)
                 folder.add(file.name, self.key(variant, name, frame) or "")
+                notes.append(artifact.note(scene, value) if artifact.note else "")
                 advance()
+        for note in filter(None, notes):  # after the bar, which it would break
+            progress.note(f"{self.file_of_scene}: {note}")
 
     def _close(self, stage: str) -> None:
         """Write the manifest of each complete folder of the stage, and remove the folders of former variants."""

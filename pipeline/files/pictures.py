@@ -6,10 +6,11 @@ lowest row first.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from pipeline.files import atomic, sandbox
 
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709, of sRGB values
 LARGEST = 16384  # pixels along a side of a user's picture
+BOXED = 4  # pixels left for each of a scaled picture, at least: a filter of so few costs little
 
 
 def write(path: Path, picture: np.ndarray) -> None:
@@ -66,8 +68,9 @@ def _pixels(path: Path) -> dict[str, Any]:
     return {"pixels": pixels}
 
 
-def _decoded(path: Path, types: Mapping[str, str], otherwise: str) -> tuple[np.ndarray, Any]:
-    """The pixels (h, w, channels) and what the file says of them; `types`: in which type to take each that is stored.
+def _decoded(path: Path, types: Mapping[str, str], otherwise: str, largest: int = LARGEST) -> tuple[np.ndarray, Any]:
+    """The pixels (h, w, channels), upright, and what the file says of them; `types`: in which type to take each that is
+    stored.
 
     Raises ValueError if it is no picture, too large, or not all there.
     """
@@ -79,14 +82,25 @@ def _decoded(path: Path, types: Mapping[str, str], otherwise: str) -> tuple[np.n
     if source is None:
         raise ValueError(f"no picture ({_first_line(oiio.geterror())})")
     spec = source.spec()
-    if max(spec.width, spec.height) > LARGEST:
-        raise ValueError(f"{spec.width} x {spec.height} pixels; the largest side read is {LARGEST}")
+    if max(spec.width, spec.height) > largest:
+        raise ValueError(f"has {spec.width} x {spec.height} pixels; {largest} a side are the most")
     pixels = source.read_image(types.get(str(spec.format), otherwise))
     error = source.geterror()
     source.close()
     if pixels is None or error:
         raise ValueError(f"damaged or cut short ({_first_line(error)})")
-    return np.asarray(pixels), spec
+    return _upright(np.asarray(pixels), spec.get_int_attribute("Orientation", 1)), spec
+
+
+def _upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
+    """Stored pixels as a viewer shows them: `orientation` of EXIF and TIFF, 1 to 8, is how the camera was held."""
+    if orientation in (5, 6, 7, 8):
+        pixels = pixels.swapaxes(0, 1)
+    if orientation in (2, 3, 6, 7):
+        pixels = pixels[:, ::-1]
+    if orientation in (3, 4, 7, 8):
+        pixels = pixels[::-1]
+    return pixels
 
 
 def _coloured(path: Path) -> dict[str, Any]:
@@ -126,6 +140,43 @@ def read_foreign(path: Path, key: str) -> np.ndarray:
         return _picture(sandbox.read(_pixels, path, key)["pixels"])
     except ValueError as error:
         raise BadInput(path, key, str(error)) from error
+
+
+class Scaled(NamedTuple):
+    """A user's picture at another size: (h, w, 3) float32, 0 to 1, sRGB; and the shape (h, w) of the file, upright."""
+
+    picture: np.ndarray
+    of: tuple[int, int]
+
+
+def read_scaled(path: Path, key: str, width: int, ground: float, largest: int, kernel: str = "") -> Scaled:
+    """A user's PNG, JPEG or TIFF at a `width`, its height in proportion; on a grey `ground`, 0 to 1, where transparent.
+
+    Read in a child process. What is many times as large is averaged over boxes there: a filter of that width would take
+    minutes. `key` is the scene's, for the error. Raises `BadInput` if it is missing, damaged, cut short, or has more
+    than `largest` pixels along a side. kernel as in `resized`.
+    """
+    found = sandbox.read(_reduced, path, key, BOXED * width, ground, largest)
+    rows, columns = found["shape"]
+    height = max(1, round(rows * width / columns))
+    picture = found["picture"]
+    if picture.shape[:2] != (height, width):
+        picture = np.clip(resized(picture, width, height, kernel), 0, 1)
+    return Scaled(picture, (rows, columns))
+
+
+def _reduced(path: Path, most: int, ground: float, largest: int) -> dict[str, Any]:
+    """Runs in the child: the picture (h, w, 3) float32 on its ground, of at least `most` columns where the file has so
+    many, each the mean of a box of pixels; and the file's shape."""
+    pixels, _ = _decoded(path, {"uint16": "uint16"}, "uint8", largest)
+    rows, columns = pixels.shape[:2]
+    box = max(1, columns // most)
+    down, across = (np.rint(np.linspace(0, n, max(1, n // box) + 1)).astype(int) for n in (rows, columns))
+    means = np.empty((len(down) - 1, len(across) - 1, 3), np.float32)
+    for row, (first, last) in enumerate(itertools.pairwise(down)):
+        band = _picture(pixels[first:last], ground).mean(axis=0)
+        means[row] = np.add.reduceat(band, across[:-1], axis=0) / np.diff(across)[:, None]
+    return {"picture": means, "shape": [rows, columns]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,25 +223,26 @@ def read_grey(path: Path, key: str) -> np.ndarray:
     return np.ascontiguousarray((read_foreign(path, key) @ LUMA)[::-1])
 
 
-def _picture(stored: np.ndarray) -> np.ndarray:
-    """(h, w, 3) float32 from 0 to 1 of stored pixels: grey, colour, each with or without alpha."""
+def _picture(stored: np.ndarray, ground: float = 1.0) -> np.ndarray:
+    """(h, w, 3) float32 from 0 to 1 of stored pixels: grey, colour, each with or without alpha, on a ground."""
     pixels = stored.astype(np.float32) / np.float32(np.iinfo(stored.dtype).max)
     channels = pixels.shape[2]
     if channels > 4:
         raise ValueError(f"{channels} channels; a picture has 1 to 4")
     if channels in (2, 4):
         alpha = pixels[..., -1:]
-        pixels = pixels[..., :-1] * alpha + (1 - alpha)
+        pixels = pixels[..., :-1] * alpha + np.float32(ground) * (1 - alpha)
     return np.ascontiguousarray(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
 
 
-def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The picture (h, w, C) resampled to (height, width, C) float32: Blackman-Harris up, Lanczos 3 down."""
+def resized(picture: np.ndarray, width: int, height: int, kernel: str = "") -> np.ndarray:
+    """The picture (h, w, C) resampled to (height, width, C) float32: Blackman-Harris up, Lanczos 3 down; or by one of
+    OpenImageIO's kernels, of which "triangle" does not overshoot."""
     import OpenImageIO as oiio
 
     source = oiio.ImageBuf(np.ascontiguousarray(picture, dtype=np.float32))
     region = oiio.ROI(0, width, 0, height, 0, 1, 0, picture.shape[2])
-    result = oiio.ImageBufAlgo.resize(source, "", 0.0, roi=region)
+    result = oiio.ImageBufAlgo.resize(source, kernel, 0.0, roi=region)
     if result.has_error:
         raise ValueError(f"cannot resize: {_first_line(result.geterror())}")
     return np.asarray(result.get_pixels("float")).reshape(height, width, -1)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from pipeline.files import atomic, sandbox
 from pipeline.files.pictures import LUMA, as_bytes
 
 MOST_FRAMES = 1000  # of a user's clip
+ANY_EDGE = 1 << 20  # pixels: a frame of any size is left as it is
 MILLISECOND = Fraction(1, 1000)  # WebP's unit of time
 WEBP_QUALITY = 90  # of 100: no blocks are seen at full size
 _FORMAT = {"movflags": "+faststart", "fflags": "+bitexact"}
@@ -154,18 +155,58 @@ def _stands(path: Path, seconds: Fraction) -> bool:
     return at == len(content) and (not times or abs(sum(times) - 1000 * seconds) <= 2)
 
 
-def _frames(path: Path) -> dict[str, Any]:
-    """Runs in the child: the frames (N, h, w, 3) uint8."""
+def _upright(path: Path, most: int, edge: int) -> Iterator[tuple[np.ndarray, float | None]]:
+    """The frames (h, w, 3) uint8 of a file as a player shows them, each with its time in seconds, if it has one; scaled
+    down where a side is over `edge` pixels.
+
+    Raises ValueError for a file without video, that is cut short, or of more than `most` frames.
+    """
     import av
 
-    frames: list[np.ndarray] = []
-    with av.open(str(path)) as container:
+    try:
+        container = av.open(str(path))
+    except (av.error.InvalidDataError, av.error.EOFError) as error:
+        raise ValueError("damaged, or no video") from error
+    with container:
         if not container.streams.video:
             raise ValueError("no video in it")
-        for frame in container.decode(video=0):
-            if len(frames) == MOST_FRAMES:
-                raise ValueError(f"more than {MOST_FRAMES} frames; cut the clip")
-            frames.append(frame.to_ndarray(format="rgb24"))
+        stream = container.streams.video[0]
+        there, count = 0, 0
+        try:
+            for packet in container.demux(stream):
+                there += packet.size > 0
+                if packet.is_corrupt:
+                    raise ValueError("damaged or cut short")
+                for frame in packet.decode():
+                    if count == most:
+                        raise ValueError(f"more than {most} frames; cut the clip")
+                    count += 1
+                    yield _shown(frame, edge), frame.time
+        except av.error.FFmpegError as error:
+            raise ValueError("damaged or cut short") from error
+        if there < stream.frames:
+            raise ValueError(f"cut short: {there} of its {stream.frames} frames are there")
+
+
+def _shown(frame: Any, edge: int) -> np.ndarray:
+    """The pixels (h, w, 3) uint8 of a decoded frame, scaled down to `edge`, turned and mirrored by its display matrix
+    (9 numbers, by rows; ISO 14496-12 §8.3.2), to a right angle."""
+    scale = min(1.0, edge / max(frame.width, frame.height))
+    width, height = (max(1, round(n * scale)) for n in (frame.width, frame.height))
+    picture: np.ndarray = frame.to_ndarray(format="rgb24", width=width, height=height, interpolation="AREA")
+    stored = frame.side_data.get("DISPLAYMATRIX")
+    if stored is None:
+        return picture
+    matrix = np.frombuffer(bytes(stored), np.int32)
+    (xx, yx), (xy, yy) = matrix[:2].tolist(), matrix[3:5].tolist()  # xy: how x of the shown depends on y of the stored
+    if abs(xx) + abs(yy) < abs(xy) + abs(yx):
+        picture, xx, yy = picture.swapaxes(0, 1), xy, yx
+    return picture[:: -1 if yy < 0 else 1, :: -1 if xx < 0 else 1]
+
+
+def _frames(path: Path) -> dict[str, Any]:
+    """Runs in the child: the frames (N, h, w, 3) uint8."""
+    frames = [frame for frame, _ in _upright(path, MOST_FRAMES, ANY_EDGE)]
     if len(frames) < 2:
         raise ValueError(f"{len(frames)} frames; motion needs two")
     return {"frames": np.stack(frames)}
@@ -179,3 +220,28 @@ def read_grey(path: Path, key: str) -> np.ndarray:
     """
     frames = sandbox.read(_frames, path, key)["frames"]
     return np.ascontiguousarray((frames.astype(np.float32) / 255 @ LUMA)[:, ::-1])
+
+
+class Timed(NamedTuple):
+    """Frames (N, Y, X) uint8 grey, lowest row first, and when each begins, (N,) float64, seconds; NaN: not told."""
+
+    luma: np.ndarray
+    times: np.ndarray
+
+
+def _timed(path: Path, most: int, edge: int) -> dict[str, Any]:
+    """Runs in the child: grey frames (N, h, w) uint8 and their times (N,)."""
+    read = [(np.rint(frame.astype(np.float32) @ LUMA).astype(np.uint8), np.nan if time is None else time)
+            for frame, time in _upright(path, most, edge)]
+    if not read:
+        raise ValueError("no frame in it")
+    return {"luma": np.stack([luma for luma, _ in read]), "times": np.array([time for _, time in read], np.float64)}
+
+
+def read_timed(path: Path, key: str, most: int, edge: int) -> Timed:
+    """The frames of a user's clip, at most so many, scaled down to `edge` pixels a side (in a child process).
+
+    `key` is the scene's, for the error. Raises `BadInput` if it is missing, damaged or cut short, or has more frames.
+    """
+    found = sandbox.read(_timed, path, key, most, edge)
+    return Timed(np.ascontiguousarray(found["luma"][:, ::-1]), found["times"])

@@ -1,32 +1,34 @@
 """[clips]: the database of clips (okabe11 §4) as artifacts.
 
-    clip-001 …   the frames and the mean velocity of a clip, made by synth.photo.clips or read from a user's video
-    codebook     visual words
-    index-001 …  the pieces of a clip as assignment compares them
+    clip-fall-01 …   the frames and the mean velocity of a clip that synth.photo.clips makes
+    clip-own-01 …    the same, read from a user's video
+    codebook         visual words
+    index-fall-01 …  the pieces of a clip as assignment compares them
 
-Each is kept once for all scenes, in out/shared. A run that is interrupted goes on with the clip that it was at.
+Each is kept once for all scenes, in out/shared; a clip that is made has one name in all of them. A run that is
+interrupted goes on with the clip that it was at.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, Strict
 
 from pipeline.build.artifact import Artifact, Inputs
-from pipeline.errors import BadInput
-from pipeline.files import arrays, video
+from pipeline.build.view import value_at
+from pipeline.files import arrays
+from pipeline.photo import library
+from pipeline.photo.own import read_own
 from pipeline.photo.tables import PhotoScene
-from pipeline.tables import Asset, Table, key
+from pipeline.tables import Asset, Folder, Table, key
 
 SAMPLED = 7
 """Every so manieth descriptor of a clip goes into the sample of the codebook."""
-LEAST = 8
-"""Frames of a user's clip, at least."""
-CUT = 4.0
-"""A cut: a frame that differs from the next so many times as much as half of them do."""
 Even = Annotated[int, Field(ge=64, le=1920, multiple_of=2)]
 Families = tuple[str, ...]
 
@@ -42,6 +44,7 @@ class Clips(Table):
     length: int = key("length of a made clip", 96, "frames", ge=16, le=480, multiple_of=8)
     files: Annotated[tuple[Asset, ...], Strict(False)] = key(
         "videos of fluids, by a fixed camera, without a cut", (), max_length=150)
+    library: Folder | None = key("a folder of your own clips, which flowloom clips add fills; none: no library", None)
 
     def recipes(self) -> list[Any]:
         """The recipes of the made clips: the first `count` of the catalogue that are of the families."""
@@ -50,10 +53,17 @@ class Clips(Table):
         found = [recipe for recipe in catalogue(150) if not self.families or recipe.family in self.families]
         return found[:self.count]
 
+    @cached_property
+    def kept(self) -> tuple[Path, ...]:
+        """The files of the library's clips. Raises BadInput for a folder that is none, StorageFailed for one gone."""
+        return () if self.library is None else library.files(self.library)
+
 
 def names(scene: PhotoScene, kind: str) -> list[str]:
     """The artifacts of all clips, "clip" or "index"."""
-    return [f"{kind}-{number:03d}" for number in range(1, len(scene.clips.recipes()) + len(scene.clips.files) + 1)]
+    own = [f"own-{number:02d}" for number in range(1, len(scene.clips.files) + 1)]
+    kept = [f"library-{file.stem}" for file in scene.clips.kept]
+    return [f"{kind}-{name}" for name in [*(recipe.name for recipe in scene.clips.recipes()), *own, *kept]]
 
 
 def make_clip(scene: PhotoScene, inputs: Inputs, frames: list[int], family: str, seed: int, variation: dict[str, Any],
@@ -65,30 +75,15 @@ def make_clip(scene: PhotoScene, inputs: Inputs, frames: list[int], family: str,
     yield 0, {"luma": made.luma, "velocity": made.velocity}
 
 
-def make_own_clip(scene: PhotoScene, inputs: Inputs, frames: list[int], number: int,
-                  ) -> Iterator[tuple[int, arrays.Arrays]]:
-    """A user's clip, whose velocity is what its optical flow says."""
-    yield 0, {"luma": own_clip(scene, number)}
+def make_own_clip(scene: PhotoScene, inputs: Inputs, frames: list[int], at: str) -> Iterator[tuple[int, arrays.Arrays]]:
+    """A user's clip of the key `at`, a video, whose velocity is what its optical flow says."""
+    yield 0, {"luma": read_own(value_at(scene, at), at).luma}
 
 
-def own_clip(scene: PhotoScene, number: int) -> np.ndarray:
-    """The frames (T, Y, X) uint8 of a user's video, lowest row first. Raises BadInput for one that is no use."""
-    from synth.photo.checks import SHAKEN, camera
-
-    file, at = scene.clips.files[number], f"clips.files[{number}]"
-    read = video.read_grey(file, at)
-    if len(read) < LEAST:
-        raise BadInput(file, at, f"has {len(read)} frames; a clip has at least {LEAST}")
-    steps = np.abs(np.diff(read, axis=0)).mean(axis=(1, 2))
-    if steps.max() <= 1e-4:
-        raise BadInput(file, at, "nothing moves in it")
-    if steps.max() > CUT * max(float(np.median(steps)), 2e-3):
-        raise BadInput(file, at, f"has a cut after frame {int(steps.argmax()) + 1}")
-    luma = np.rint(255 * np.clip(read, 0, 1)).astype(np.uint8)
-    shift = camera(luma)
-    if shift > SHAKEN:
-        raise BadInput(file, at, f"the camera moves, by {shift:.1f} pixels a frame")
-    return luma
+def make_kept_clip(scene: PhotoScene, inputs: Inputs, frames: list[int], at: str,
+                   ) -> Iterator[tuple[int, arrays.Arrays]]:
+    """A clip of the library, whose frames are the file of the key `at`: checked when it was added."""
+    yield 0, {"luma": library.read(value_at(scene, at))}
 
 
 def make_codebook(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
@@ -114,15 +109,11 @@ def make_index(scene: PhotoScene, inputs: Inputs, frames: list[int], clip: str) 
     yield 0, vars(found)
 
 
-def check_clips(scene: PhotoScene) -> None:
-    """Refuses a user's clips before anything is made."""
-    for number in range(len(scene.clips.files)):
-        own_clip(scene, number)
-
-
 def clip_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """The clips, the codebook and the index of each clip."""
     recipes, clips, index = scene.clips.recipes(), names(scene, "clip"), names(scene, "index")
+    own = [(make_own_clip, f"clips.files[{k}]") for k in range(len(scene.clips.files))]
+    own += [(make_kept_clip, f"clips.kept[{k}]") for k in range(len(scene.clips.kept))]
 
     def one(name: str, reads: tuple[str, ...], needs: Sequence[str], make: Any, **more: Any) -> Artifact:
         return Artifact(name, "synth", arrays.ARRAYS, reads, tuple((n, "once") for n in needs), make, animated=False,
@@ -132,8 +123,8 @@ def clip_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
         *(one(name, ("clips.size", "clips.length"), (), make_clip, arguments={
             "family": of.family, "seed": of.seed, "variation": dict(of.variation)})
           for name, of in zip(clips, recipes, strict=False)),
-        *(one(name, ("clips.files",), (), make_own_clip, arguments={"number": k}, check=check_clips)
-          for k, name in enumerate(clips[len(recipes):])),
+        *(one(name, (at,), (), make, arguments={"at": at})
+          for name, (make, at) in zip(clips[len(recipes):], own, strict=True)),
         one("codebook", ("assignment.piece",), clips, make_codebook, arguments={"clips": clips}),
         *(one(name, ("assignment.piece",), ("codebook", clip), make_index, arguments={"clip": clip})
           for name, clip in zip(index, clips, strict=True)))

@@ -5,24 +5,21 @@ Pictures are in linear light, top row first; synth.photo has display values, the
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
 from pipeline.build.artifact import Artifact, Inputs, Needs
+from pipeline.errors import attributed_to
 from pipeline.files import arrays, images
 from pipeline.photo.clips import names
 from pipeline.photo.tables import PhotoScene
-from pipeline.photo.target import check_target, read_target
+from pipeline.photo.target import check_target, target_inputs, target_of
 
 
-def _target(scene: PhotoScene, inputs: Inputs) -> Any:
-    """The synth.photo.animate.Target, of a file or made."""
-    return read_target(scene, inputs.read("made") if "made" in inputs else None)
-
-
-def _cut(scene: PhotoScene) -> Any:
+def cut_of(scene: PhotoScene) -> Any:
+    """How pictures are cut into pieces."""
     from synth.photo.pieces import Cut
 
     return Cut(scene.assignment.piece)
@@ -33,34 +30,12 @@ def _database(inputs: Inputs, index: list[str]) -> Any:
     from synth.photo.assign import Database
     from synth.photo.index import Index
 
-    return Database.joined([Index(**inputs.read(name)) for name in index], inputs.read("codebook")["words"])
+    with attributed_to("clips"):
+        return Database.joined([Index(**inputs.read(name)) for name in index], inputs.read("codebook")["words"])
 
 
-def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index: list[str],
-                    ) -> Iterator[tuple[int, arrays.Arrays]]:
-    """Which piece of which clip is shown where (§5), and the motion."""
-    from synth.photo.animate import motion
-    from synth.photo.assign import assign
-
-    target, database, cut = _target(scene, inputs), _database(inputs, index), _cut(scene)
-    of, found = assign(target.grey, target.fluid, database, cut, target.wanted, scene.assignment.settings())
-    shown = found.shown(database)
-    yield 0, {"node": of.corner, "edges": of.edges, "across": of.across, "clip": shown.clip, "version": shown.version,
-              "corner": shown.corner, "cells": shown.motion, "exposure": found.exposure, "angle": found.angle,
-              "energies": np.array(found.energies), "motion": motion(target, of, shown, cut)}
-
-
-def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
-               ) -> Iterator[tuple[int, np.ndarray]]:
-    """The fluid of each frame, everywhere, before the matte cuts it (§6)."""
-    from render import tonemap
-    from synth.photo.animate import Look, composed
-    from synth.photo.assign import Nodes, Shown
-    from synth.photo.integrate import differences
-
-    target, cut, kept = _target(scene, inputs), _cut(scene), inputs.read("assignment")
-    of = Nodes(kept["node"], kept["edges"], kept["across"])
-    shown = Shown(kept["clip"], kept["version"], kept["corner"], kept["cells"])
+def frames_of(inputs: Inputs, clips: list[str]) -> Callable[[int], np.ndarray]:
+    """The frames of each clip, read when they are wanted."""
     read: dict[int, np.ndarray] = {}
 
     def luma(number: int) -> np.ndarray:
@@ -68,12 +43,68 @@ def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list
             read[number] = inputs.read(clips[number])["luma"]
         return read[number]
 
-    rows, columns = target.matte.shape
-    more = differences(of, shown, luma, (rows, columns), cut, scene.frames, scene.seed)
-    look = Look(scene.photo.carried, scene.photo.strength, scene.photo.matching)
-    for frame, picture in enumerate(composed(target, more, kept["motion"], look, scene.seed), start=1):
+    return luma
+
+
+def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index: list[str], clips: list[str],
+                    ) -> Iterator[tuple[int, arrays.Arrays]]:
+    """Which piece of which clip is shown where (§5), and the motion."""
+    from synth.photo.animate import motion
+    from synth.photo.assign import assign
+    from synth.photo.fit import fitted
+
+    target, database, cut = target_of(scene, inputs), _database(inputs, index), cut_of(scene)
+    of, found = assign(target.grey, target.fluid, database, cut, target.wanted, scene.assignment.settings())
+    shown = found.shown(database)
+    if scene.assignment.energy == "mended":
+        shown = fitted(target.grey, of, shown, found.exposure, frames_of(inputs, clips), cut)
+    yield 0, {"node": of.corner, "edges": of.edges, "across": of.across, "clip": shown.clip, "version": shown.version,
+              "corner": shown.corner, "cells": shown.motion, "fit": shown.fit, "exposure": found.exposure,
+              "angle": found.angle, "energies": np.array(found.energies), "motion": motion(target, of, shown, cut)}
+
+
+def assigned(inputs: Inputs) -> tuple[Any, Any]:
+    """The synth.photo.assign.Nodes of the target, and what they are Shown."""
+    from synth.photo.assign import Nodes, Shown
+
+    kept = inputs.read("assignment")
+    return (Nodes(kept["node"], kept["edges"], kept["across"]),
+            Shown(kept["clip"], kept["version"], kept["corner"], kept["cells"], kept["fit"]))
+
+
+def widened(scene: PhotoScene, assignment: arrays.Arrays) -> str:
+    """What is said where pieces of the clips that move as wanted were too few; "" where they were not."""
+    from synth.photo.assign import ANGLES
+
+    angle = assignment["angle"]
+    wide = int((angle > ANGLES[0]).sum())
+    guides = " and ".join(name for name, there in (("the strokes", scene.photo.strokes or scene.photo.made),
+                                                   ("the speed map", scene.photo.speed)) if there)
+    return "" if not wide else (
+        f"clips: {wide} of {len(angle)} pieces of the picture found too few candidates within {ANGLES[0]:.0f} degrees "
+        f"of {guides}; the angle was widened, to {angle.max():.0f} at most")
+
+
+def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
+               ) -> Iterator[tuple[int, np.ndarray]]:
+    """The fluid of each frame, everywhere, before the matte cuts it (§6)."""
+    from render import tonemap
+    from synth.photo.animate import Look, composed
+    from synth.photo.integrate import differences
+
+    target, cut, (of, shown) = target_of(scene, inputs), cut_of(scene), assigned(inputs)
+    box = target.box(cut.size)
+    part = target.part(box)
+    moved = of._replace(corner=of.corner - [box[0].start, box[1].start])
+    rows, columns = part.matte.shape
+    more = differences(moved, shown, frames_of(inputs, clips), (rows, columns), cut, scene.frames, scene.seed,
+                       scene.photo.blending)
+    look = Look(scene.photo.carried, scene.photo.feature, scene.photo.strength, scene.photo.matching)
+    whole, moves = target.picture.copy(), inputs.read("assignment")["motion"][box]
+    for frame, picture in enumerate(composed(part, more, moves, look, scene.seed), start=1):
         if frame in frames:
-            yield frame, tonemap.from_srgb(np.clip(picture, 0, 1))[::-1].astype(np.float32)
+            whole[box] = np.clip(picture, 0, 1)
+            yield frame, tonemap.from_srgb(whole)[::-1].astype(np.float32)
         if frame == frames[-1]:
             break
 
@@ -89,7 +120,7 @@ def make_mattes(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterato
     """The matte of each frame (h, w, 3), which moves with scene.photo.dynamics."""
     from synth.photo.animate import mattes
 
-    target = _target(scene, inputs)
+    target = target_of(scene, inputs)
     fluid = np.stack([np.rint(255 * np.clip(_display(inputs, frame).mean(axis=2), 0, 1)).astype(np.uint8)
                       for frame in range(1, scene.frames + 1)])
     found = mattes(target, fluid, scene.photo.dynamics)
@@ -102,45 +133,23 @@ def make_frames(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterato
     from render import tonemap
     from synth.photo.animate import over_background
 
-    target = _target(scene, inputs)
+    target = target_of(scene, inputs)
     for frame in frames:
         matte = np.ascontiguousarray(inputs.read("mattes", frame)[::-1, :, 0])
         picture = over_background(target, _display(inputs, frame), matte)
         yield frame, tonemap.from_srgb(np.clip(picture, 0, 1))[::-1].astype(np.float32)
 
 
-def make_target_picture(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
-    """The photograph."""
-    from render import tonemap
-
-    target = _target(scene, inputs)
-    yield 0, tonemap.from_srgb(target.picture)[::-1].astype(np.float32)
-
-
-def make_motion_picture(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
-    """The motion by colour: its direction by hue, its speed by strength."""
-    from render import lic, tonemap
-
-    yield 0, tonemap.from_srgb(lic.colour(inputs.read("assignment")["motion"], scene.figure.panel))
-
-
 def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """All after the clips."""
     clips, index = names(scene, "clip"), names(scene, "index")
-    target: Needs = () if scene.photo.made is None else (("made", "once"),)
-    made = [
+    target: Needs = tuple((name, "once") for name in target_inputs(scene))
+    return (
         Artifact("assignment", "synth", arrays.ARRAYS, ("photo", "assignment"),
-                 (*target, ("codebook", "once"), *((name, "once") for name in index)), make_assignment,
-                 {"index": index}, animated=False, check=check_target),
+                 (*target, ("codebook", "once"), *((name, "once") for name in (*index, *clips))), make_assignment,
+                 {"index": index, "clips": clips}, animated=False, check=check_target, note=widened),
         Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
                  (*target, ("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
         Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (*target, ("fluid", "every")), make_mattes),
         Artifact("frames", "synth", images.LIGHT, ("photo",), (*target, ("fluid", "same"), ("mattes", "same")),
-                 make_frames)]
-    if "target" in scene.figure.panels:
-        made.append(Artifact("target", "render", images.LIGHT, ("photo",), target, make_target_picture,
-                             animated=False))
-    if "motion" in scene.figure.panels:
-        made.append(Artifact("motion", "render", images.LIGHT, ("figure.panel",), (("assignment", "once"),),
-                             make_motion_picture, animated=False))
-    return tuple(made)
+                 make_frames))

@@ -1,24 +1,58 @@
-"""The panels of a figure of a photograph."""
+"""The panels of a figure of a photograph, and the pictures that are made for them."""
 
 from __future__ import annotations
 
-from pipeline.build.method import Panel
-from pipeline.photo.tables import PhotoScene
+from collections.abc import Iterator
+from itertools import groupby
+from typing import get_args
 
-MOVING = {"result": "frame", "matte": "matte of frame"}
-"""Panels that the still shows at each moment, and what it calls them."""
+from pipeline.build.artifact import Artifact
+from pipeline.build.method import Panel
+from pipeline.photo.neighbours import neighbour_views
+from pipeline.photo.pieces import piece_views
+from pipeline.photo.tables import OfPair, OfPiece, PhotoScene
+from pipeline.photo.views import View, target_view
+
+MOVING = {"result": ("frames", "frame"), "matte": ("mattes", "matte of frame")}
+"""Panels that the still shows at each moment: their artifacts, and what it calls them."""
 
 
 def panels(scene: PhotoScene) -> tuple[Panel, ...]:
     """The panels of the scene's figure; with moments, in the still one result and one matte for each."""
     full = scene.figure.panel
     made: list[Panel] = []
-    for name in scene.figure.panels:
-        artifact = {"target": "target", "matte": "mattes", "motion": "motion", "result": "frames"}[name]
-        if name in MOVING and scene.figure.moments:
-            made += [Panel(f"{MOVING[name]} {moment}", artifact, full, "straight", frame=moment, shown_in="still")
-                     for moment in scene.figure.moments]
-            made.append(Panel(name, artifact, full, "straight", shown_in="animation"))
-        else:
-            made.append(Panel(name, artifact, full, "straight", legend=name == "motion"))
+    for shown in _shown(scene):
+        if isinstance(shown, View):
+            made.append(Panel(shown.label, shown.artifact.name, shown.width, "straight", legend=shown.legend,
+                              border=shown.border))
+            continue
+        artifact, name = MOVING[shown]
+        for moment in scene.figure.moments:
+            made.append(Panel(f"{name} {moment}", artifact, full, "straight", frame=moment, shown_in="still"))
+        made.append(Panel(shown, artifact, full, "straight",
+                          shown_in="animation" if scene.figure.moments else "both"))
     return tuple(made)
+
+
+def view_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
+    """The pictures that are made for panels alone."""
+    return tuple({shown.artifact.name: shown.artifact for shown in _shown(scene) if isinstance(shown, View)}.values())
+
+
+def _shown(scene: PhotoScene) -> Iterator[str | View]:
+    """The views in reading order, and "matte" and "result", which need none. Panels of pieces that follow each other
+    stand together, once for each piece."""
+    for of_piece, run in groupby(scene.figure.panels, lambda name: name in get_args(OfPiece)):
+        names = list(run)
+        if of_piece:
+            for number in range(1, len(scene.figure.pieces) + 1):
+                for name in names:
+                    yield from piece_views(scene, name, number)
+            continue
+        for name in names:
+            if name in MOVING:
+                yield name
+            elif name in get_args(OfPair):
+                yield from neighbour_views(scene, name)
+            else:
+                yield target_view(scene, name)

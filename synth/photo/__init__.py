@@ -33,11 +33,13 @@ Then the database (§4), the assignment (§5) and the synthesis (§6):
     guides      strokes to an orientation map (fig. 8)
     minimize    minimizers of an energy over labels: TRW-S, α-expansion, ICM (Eq. 4)
     assign      a piece of a clip for each piece of the target (Eqs. 2 to 6)
+    fit         pieces fitted to the edges of the target
     integrate   differences from averages, blended band by band; the motion field (fig. 9)
     appearance  the average image, gains, histograms: the look of the target
     photograph  the photograph carried along the motion (beyond the paper)
     boundary    the matte that moves with fire and smoke (fig. 10), what is seen behind it
     animate     the whole, from target to frames
+    steps       inner steps, as figures show them (figs. 5 to 7, 9)
 
 Notation:
 

@@ -10,22 +10,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal
+from itertools import repeat
+from typing import Any, Literal
 
 import numpy as np
 
+from synth.photo import photograph
 from synth.photo.appearance import added, average, extended, gains, matched
 from synth.photo.assign import Nodes, Shown, Wanted
 from synth.photo.boundary import dynamic_matte
 from synth.photo.integrate import Differences, motion_field
 from synth.photo.motion import optical_flow
-from synth.photo.photograph import carried
 from synth.photo.pieces import Cut
 
-CALMED = 0.35
+CALMED = 0.5
 """What of the differences is left, of their full strength, where the photograph is carried in full: it moves itself."""
 REGION = 64
 """Pixels of a region in which histograms are matched."""
+THIN = 0.2
+"""The least matte by which the fluid can be told from what is behind it."""
 TOWARDS = 0.9
 """Share of the wanted direction in the motion that the photograph is carried by; the rest is that of the pieces."""
 
@@ -35,19 +38,22 @@ class Look:
     """How frames are composed.
 
     carried   0..1: the photograph carried along the motion, in place of the blurred average
+    feature   size of what moves, as streaks, ripples and billows, pixels: what is larger stands
     strength  of the differences
     matching  "gains": by the strength of bands, over all time, for fire and smoke; "histograms": frame by frame and
-              region by region as in the paper, for water; "none"
+              region by region, for water; "regions": as in the paper, differences added as they are and regions
+              side by side; "none"
     """
 
-    carried: float = 0.85
+    carried: float = 1.0
+    feature: float = 10.0
     strength: float = 1.0
-    matching: Literal["gains", "histograms", "none"] = "gains"
+    matching: Literal["gains", "histograms", "regions", "none"] = "gains"
 
     def __post_init__(self) -> None:
-        if not 0 <= self.carried <= 1 or self.strength < 0:
-            raise ValueError(f"the carried share is in 0..1 and the strength not negative, not {self.carried} and "
-                             f"{self.strength}")
+        if not 0 <= self.carried <= 1 or self.strength < 0 or self.feature < 1:
+            raise ValueError(f"the carried share is in 0..1, the strength not negative, a feature of a pixel or more, "
+                             f"not {self.carried}, {self.strength} and {self.feature}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +77,35 @@ class Target:
     def fluid(self) -> np.ndarray:
         """The matte without what stands still: (Y, X) float32."""
         return self.matte if self.frozen is None else np.where(self.frozen, np.float32(0), self.matte)
+
+    def box(self, margin: int) -> tuple[slice, slice]:
+        """The rows and columns of the matte, and `margin` pixels round it."""
+        rows, columns = (np.flatnonzero((self.matte > 0).any(axis=axis)) for axis in (1, 0))
+        return (slice(max(int(rows[0]) - margin, 0), int(rows[-1]) + 1 + margin),
+                slice(max(int(columns[0]) - margin, 0), int(columns[-1]) + 1 + margin))
+
+    def part(self, box: tuple[slice, slice]) -> Target:
+        """The target of a box alone: what is far from the fluid takes no time."""
+        def cut(values: np.ndarray | None) -> Any:
+            return None if values is None else np.ascontiguousarray(values[box])
+
+        return Target(cut(self.picture), cut(self.matte), cut(self.background), cut(self.frozen),
+                      Wanted(*(cut(values) for values in self.wanted)))
+
+    @property
+    def shows(self) -> np.ndarray:
+        """Where the picture shows enough of the fluid to read it: (Y, X) bool. With a background it is known what else
+        a soft matte shows."""
+        return np.asarray(self.fluid > (0.5 if self.background is None else THIN))
+
+    @property
+    def foreground(self) -> np.ndarray:
+        """The fluid's own colours (Y, X, 3) float32, everywhere: the picture without what is behind it, and beyond the
+        fluid those that are nearest."""
+        if self.background is None:
+            return extended(self.picture, self.shows)
+        alpha = np.maximum(self.matte, THIN)[..., None]
+        return extended(np.clip((self.picture - (1 - alpha) * self.background) / alpha, 0, 1), self.shows)
 
     @property
     def grey(self) -> np.ndarray:
@@ -100,20 +135,22 @@ def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, s
     2. The differences, matched to the target.
     """
     length = more.bands.shape[1]
-    fluid = extended(target.picture, target.matte)
+    fluid = target.foreground
     # 1. ground
     still = average(fluid, moves) if look.carried < 1 else fluid
-    moving = carried(fluid, moves, length, seed, target.frozen) if look.carried > 0 else None
+    moving = (photograph.frames(fluid, moves, length, seed, look.feature, target.shows)
+              if look.carried > 0 else repeat(still, length))
     grey = fluid.mean(axis=2)
     strength = look.strength * (1 - look.carried * (1 - CALMED))
     # 2. differences
-    scale = (np.full_like(more.bands[:, 0], 1 / 255) if look.matching == "none"
-             else gains(grey, more.bands, target.fluid))
-    for frame in range(length):
-        ground = still if moving is None else (1 - look.carried) * still + look.carried * moving[frame]
-        shown = added(ground, (scale * more.bands[:, frame]).sum(axis=0) * strength)
-        if look.matching == "histograms":
-            wanted = matched(shown.mean(axis=2), grey, target.fluid, REGION)
+    as_they_are = look.matching in ("none", "regions")
+    scale = (np.full_like(more.bands[:, 0], 1 / 255) if as_they_are else gains(grey, more.bands, target.fluid))
+    for frame, moved in enumerate(moving):
+        ground = (1 - look.carried) * still + look.carried * moved
+        change = (scale * more.bands[:, frame]).sum(axis=0) * strength
+        shown = np.clip(ground + change[..., None], 0, 1) if look.matching == "regions" else added(ground, change)
+        if look.matching in ("histograms", "regions"):
+            wanted = matched(shown.mean(axis=2), grey, target.fluid, REGION, look.matching == "histograms")
             shown = added(shown, wanted - shown.mean(axis=2))
         yield shown
 

@@ -32,12 +32,11 @@ NOISE = 0.004
 """Deviation below which a target has no detail: its own noise is not animated."""
 
 
-def extended(picture: np.ndarray, matte: np.ndarray) -> np.ndarray:
-    """The picture with the fluid's colours outside the matte (Y, X) too: no blur then brings in the shore's."""
-    outside = matte < 0.5
-    if not outside.any() or outside.all():
+def extended(picture: np.ndarray, fluid: np.ndarray) -> np.ndarray:
+    """The picture with the fluid's colours outside of it (Y, X) bool too: no blur then brings in the shore's."""
+    if fluid.all() or not fluid.any():
         return picture
-    nearest = ndimage.distance_transform_edt(outside, return_distances=False, return_indices=True)
+    nearest = ndimage.distance_transform_edt(~fluid, return_distances=False, return_indices=True)
     return picture[tuple(nearest)]
 
 
@@ -100,29 +99,29 @@ def _local(values: np.ndarray, matte: np.ndarray) -> np.ndarray:
 def added(ground: np.ndarray, more: np.ndarray) -> np.ndarray:
     """Pictures ground (..., C) with `more` (...,), a change of the grey level, added where there is room: float32.
 
-    In the logit of the grey level, and so never below 0 or above 1; colours keep their ratios as far as they can.
+    In the logit of the grey level, and so never below 0 or above 1. Colours by one power each: what becomes darker
+    becomes deeper, as flames do, and what becomes brighter whiter, as foam does.
     """
     grey = np.clip(ground.mean(axis=-1), 1e-4, 1 - 1e-4)
     room = np.maximum(grey * (1 - grey), ROOM)
-    shifted = np.log(grey / (1 - grey)) + more / room
-    changed = 1 / (1 + np.exp(-shifted))
-    # darker: all channels by one factor; brighter: all nearer to white by one
-    darker, brighter = changed / grey, (1 - changed) / (1 - grey)
-    return np.where((changed < grey)[..., None], ground * darker[..., None],
-                    1 - (1 - ground) * brighter[..., None]).astype(np.float32)
+    changed = 1 / (1 + np.exp(-(np.log(grey / (1 - grey)) + more / room)))
+    coloured = np.clip(ground, 1e-4, 1) ** (np.log(changed) / np.log(grey))[..., None]
+    return np.clip(coloured * (changed / coloured.mean(axis=-1))[..., None], 0, 1).astype(np.float32)
 
 
-def matched(frame: np.ndarray, target: np.ndarray, matte: np.ndarray, region: int) -> np.ndarray:
+def matched(frame: np.ndarray, target: np.ndarray, matte: np.ndarray, region: int, overlapping: bool = True,
+            ) -> np.ndarray:
     """A frame (Y, X) with the target's (Y, X) histograms of bands and values, region by region [Heeger, Bergen 1995].
 
     "We divide the image space into regular grids and apply the process to each region independently." Regions of
-    `region` pixels overlap by half with windows that add up to one, or their lattice would show.
+    `region` pixels overlap by half with windows that add up to one, or their lattice would show, as the paper's does.
     """
     ours, theirs = bands(frame[None].astype(np.float32)), bands(target[None].astype(np.float32))
     total, share = np.zeros(frame.shape), np.zeros(frame.shape)
-    ramp = np.sin(np.pi * (np.arange(region) + 0.5) / region) ** 2
-    for y in range(-(region // 2), frame.shape[0], region // 2):
-        for x in range(-(region // 2), frame.shape[1], region // 2):
+    ramp, step = (np.sin(np.pi * (np.arange(region) + 0.5) / region) ** 2, region // 2) if overlapping else (
+        np.ones(region), region)
+    for y in range(step - region, frame.shape[0], step):
+        for x in range(step - region, frame.shape[1], step):
             low, left = max(y, 0), max(x, 0)
             part = np.s_[low:y + region, left:x + region]
             inside = matte[part] > 0.5

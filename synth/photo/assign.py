@@ -7,13 +7,14 @@
 Eq. 5 as printed adds a similarity to a sum that is minimized; here it is 1 - I. SIFT sees neither contrast nor
 brightness and puts white water into a dark pool; V has terms for both. Eq. 3 is a squared distance of features in units
 of their own; here it is the distance, each feature divided by its deviation over the database, so that λ, σ and ρ are
-plain numbers.
+plain numbers. Eqs. 2, 3 and 5 as they are printed are there to compare with (`Settings.energy`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -22,7 +23,7 @@ from synth.photo.index import BAND, CELLS, DEVIATION, MEAN, TEXTURE, Index, desc
 from synth.photo.minimize import MINIMIZERS, Energy
 from synth.photo.motion import CELL, textureness
 from synth.photo.pieces import OVERLAP, Cut
-from synth.photo.words import common
+from synth.photo.words import TOTAL, common
 
 ANGLES = (45.0, 60.0, 90.0, 180.0)
 """Degrees between the wanted and a piece's motion: the first that leaves enough candidates."""
@@ -48,6 +49,8 @@ class Settings:
     brightness  weight of the difference of brightness in V
     of_one_clip share of a node's candidates that may come from one clip
     minimizer   "messages" (TRW-S), "expansion" (the paper's), "modes" or "data"
+    energy      "mended", or "printed": V = I of the average image; d a squared difference of powers, of the mean motion
+                too; in pixels, grey levels and cells
     """
 
     candidates: int = 100
@@ -58,6 +61,7 @@ class Settings:
     brightness: float = 0.5
     of_one_clip: float = 0.25
     minimizer: str = "messages"
+    energy: Literal["mended", "printed"] = "mended"
 
     def __post_init__(self) -> None:
         if self.candidates < 1 or not 0 < self.of_one_clip <= 1:
@@ -112,13 +116,14 @@ class Wanted(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What each of P nodes shows: the clip (P,), the version (P,) and the corner (P, 2) of its piece, and the mean
-    motion of its cells (P, CELLS, CELLS, 2), pixels per frame."""
+    """What each of P nodes shows: the clip (P,), the version (P,) and the corner (P, 2) of its piece, the mean motion
+    of its cells (P, CELLS, CELLS, 2), pixels per frame, and how it is fitted (P,), which of FITS."""
 
     clip: np.ndarray
     version: np.ndarray
     corner: np.ndarray
     motion: np.ndarray
+    fit: np.ndarray
 
 
 class Assigned(NamedTuple):
@@ -136,10 +141,10 @@ class Assigned(NamedTuple):
     energies: tuple[float, float]
 
     def shown(self, database: Database) -> Shown:
-        """What the nodes show."""
+        """What the nodes show, not fitted yet."""
         pieces, row = database.pieces, self.piece
         return Shown(database.clip[row], pieces.version[row], pieces.corner[row].astype(np.int64),
-                     pieces.features[row][..., MEAN].astype(np.float32))
+                     pieces.features[row][..., MEAN].astype(np.float32), np.zeros(len(row), np.int64))
 
 
 def nodes(matte: np.ndarray, cut: Cut) -> Nodes:
@@ -177,7 +182,8 @@ def assign(picture: np.ndarray, matte: np.ndarray, database: Database, cut: Cut,
     # 2. candidates
     piece, exposure, data, angle = _candidates(target, _at_nodes(wanted, of, cut, picture.shape), database, settings)
     # 3. neighbours
-    smooth = settings.weight * _between(of, piece, database, settings)
+    between = _printed if settings.energy == "printed" else _between
+    smooth = settings.weight * between(of, piece, database, settings)
     # 4. minimize
     energy = Energy(data, of.edges, smooth)
     found = MINIMIZERS[settings.minimizer](energy)
@@ -224,21 +230,25 @@ def _candidates(target: _Target, wanted: Wanted, database: Database, settings: S
     """
     pieces = database.pieces
     count, exposures = pieces.histogram.shape[:2]
-    flat = pieces.histogram.reshape(count * exposures, -1)
-    light = pieces.brightness.astype(np.float64)
-    squares = pieces.features[..., TEXTURE].astype(np.float64) ** 2
-    strength = np.log(np.sqrt(squares.mean(axis=(1, 2))) + FLAT)
-    mean = pieces.features[..., MEAN].astype(np.float64).mean(axis=(1, 2))
+    similar = common(target.histogram, pieces.histogram.reshape(count * exposures, -1)).reshape(-1, count, exposures)
+    light = pieces.brightness.astype(np.float32)
+    squares = pieces.features[..., TEXTURE].astype(np.float32) ** 2
+    strength = np.log(np.sqrt(squares.mean(axis=(1, 2))) + np.float32(FLAT))
+    mean = pieces.features[..., MEAN].astype(np.float32).mean(axis=(1, 2))
     limit = min(settings.candidates, count)
     piece, exposure = (np.zeros((len(target.brightness), limit), np.int64) for _ in range(2))
     data, angle = np.full(piece.shape, np.inf), np.zeros(len(piece))
     for p in range(len(piece)):
         allowed, angle[p] = _allowed(mean, _of_node(wanted, p), limit)
-        rows = (allowed[:, None] * exposures + np.arange(exposures)).ravel()
-        similar = common(target.histogram[p:p + 1], flat[rows])[0].reshape(-1, exposures).astype(np.float64)
-        texture = np.abs(strength[allowed] - np.log(target.texture[p] + FLAT)).mean(axis=1)
-        value = (1 - similar + settings.texture * texture[:, None]
-                 + settings.brightness * np.abs(light[allowed] - target.brightness[p]) / 255)
+        if settings.energy == "printed":
+            # candidates are chosen "based on their similar appearance"; of them, Eq. 5 prefers the least similar
+            order = np.argsort(-similar[p, allowed, 0].astype(np.int64), kind="stable")[:limit]
+            piece[p, :len(order)] = allowed[order]
+            data[p, :len(order)] = similar[p, allowed[order], 0] / TOTAL
+            continue
+        texture = np.abs(strength[allowed] - np.log(target.texture[p] + FLAT).astype(np.float32)).mean(axis=1)
+        value = (1 - similar[p, allowed] / np.float32(TOTAL) + np.float32(settings.texture) * texture[:, None]
+                 + np.float32(settings.brightness / 255) * np.abs(light[allowed] - np.float32(target.brightness[p])))
         best = value.argmin(axis=1)
         order = _limited(value.min(axis=1), database.clip[allowed], limit, settings.of_one_clip)
         piece[p, :len(order)], exposure[p, :len(order)] = allowed[order], best[order]
@@ -292,21 +302,42 @@ def _between(of: Nodes, piece: np.ndarray, database: Database, settings: Setting
     for part, weight in ((MEAN, 1.0), (BAND, settings.sigma), (TEXTURE, settings.rho)):
         spread = float(np.sqrt(features[..., part].astype(np.float64).var(axis=(0, 1, 2)).mean()))
         features[..., part] *= np.float32(np.sqrt(weight) / max(spread, 1e-6))
-    half = CELLS // OVERLAP
     found = np.empty((len(of.edges), piece.shape[1], piece.shape[1]), np.float32)
     # BLAS rounds by the number of its threads
     with threadpool_limits(1, user_api="blas"):
-        for edge, ((p, q), across) in enumerate(zip(of.edges, of.across, strict=True)):
-            ours, theirs = features[piece[p]], features[piece[q]]
+        for edge, ((p, q), ours, theirs) in enumerate(_shared(of, piece, features)):
             # 2. distances
-            one, other = (ours[:, :, half:], theirs[:, :, :half]) if across else (ours[:, half:], theirs[:, :half])
-            found[edge] = _distances(one.reshape(len(one), -1), other.reshape(len(other), -1), half * CELLS)
+            found[edge] = np.sqrt(_squares(ours, theirs) / ours.shape[1])
             # 3. again
             found[edge] += AGAIN * (piece[p][:, None] == piece[q])
     return found
 
 
-def _distances(one: np.ndarray, other: np.ndarray, cells: int) -> np.ndarray:
-    """Euclidean distances between rows, over the root of the number of cells: (L, L) float32."""
-    squares = (one * one).sum(axis=1)[:, None] + (other * other).sum(axis=1) - 2 * (one @ other.T)
-    return np.sqrt(np.maximum(squares, 0) / cells)
+def _printed(of: Nodes, piece: np.ndarray, database: Database, settings: Settings) -> np.ndarray:
+    """W (E, L, L) float32 as printed: σ and ρ weigh powers, also of the mean, squared, and textureness."""
+    features = database.pieces.features.astype(np.float32)
+    mean = (features[..., MEAN] ** 2).sum(axis=-1, keepdims=True)
+    powers = np.concatenate([mean, np.sqrt(np.float32(settings.sigma)) * features[..., BAND] ** 2], axis=-1)
+    found = np.empty((len(of.edges), piece.shape[1], piece.shape[1]), np.float32)
+    with threadpool_limits(1, user_api="blas"):
+        for edge, (_, ours, theirs) in enumerate(_shared(of, piece, powers)):
+            found[edge] = _squares(ours, theirs)
+        for edge, (_, ours, theirs) in enumerate(_shared(of, piece, features[..., TEXTURE])):
+            found[edge] += np.float32(settings.rho) * np.sqrt(_squares(ours, theirs))
+    return found
+
+
+def _shared(of: Nodes, piece: np.ndarray, features: np.ndarray,
+            ) -> Iterator[tuple[tuple[int, int], np.ndarray, np.ndarray]]:
+    """Of each edge its nodes, and the features (L, cells, …) of the cells that they share, of both."""
+    half = CELLS // OVERLAP
+    for (p, q), across in zip(of.edges.tolist(), of.across, strict=True):
+        ours, theirs = features[piece[p]], features[piece[q]]
+        one, other = (ours[:, :, half:], theirs[:, :, :half]) if across else (ours[:, half:], theirs[:, :half])
+        yield (p, q), one.reshape(len(one), half * CELLS, -1), other.reshape(len(other), half * CELLS, -1)
+
+
+def _squares(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Squared distances between rows (L, …) of one and of the other: (L, L) float32."""
+    a, b = one.reshape(len(one), -1), other.reshape(len(other), -1)
+    return np.maximum((a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1) - 2 * (a @ b.T), 0)

@@ -6,6 +6,8 @@ Pictures alone do not show a thin line at the edge where a fall should be; `faul
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from scipy import ndimage
 
@@ -28,6 +30,9 @@ SHAKEN = 0.25  # pixels that the whole frame moves from one to the next: the cam
 
 PAIRS = 12  # frames that are compared with their next, to know a camera that moves
 BORDER = 8  # pixels that come into view
+CUT = 1.5  # steps: one that is so many times the largest of those around it may be a cut
+LASTING = 1.35  # if the means before and after it also differ so many times more than elsewhere: no frame was just lost
+CALM = 0.5  # grey levels: the steps of the calmest clip in which cuts are told
 EXPLAINED = 0.5  # of the change between two frames, what is left when a shift explains it
 
 
@@ -132,3 +137,29 @@ def _panned(one: np.ndarray, other: np.ndarray) -> float:
     inside = np.s_[BORDER:-BORDER, BORDER:-BORDER]
     left = np.abs(other - moved)[inside].mean()
     return float(np.hypot(x, y)) if left < EXPLAINED * np.abs(other - one.astype(np.float32))[inside].mean() else 0.0
+
+
+def cut(luma: np.ndarray) -> int:
+    """The frame, counted from 1, after which a clip (T, Y, X) uint8 shows something else; 0 where there is no cut.
+
+    1. The step from each frame to the next, over the largest of NEAR steps on either side.
+    2. Of the steps that stand out, one after which the mean of NEAR frames is another than before: of water and fire it
+       hardly changes, however much of it a camera leaves out.
+    """
+    # 1. steps
+    steps = np.array([np.abs(after - before.astype(np.int16)).mean() for before, after in itertools.pairwise(luma)])
+    around = np.array([max(CALM, *steps[max(0, k - NEAR):k], *steps[k + 1:k + 1 + NEAR]) for k in range(len(steps))])
+    # 2. what lasts
+    changes = np.array([np.abs(_mean(luma, k + 1, k + 1 + NEAR) - _mean(luma, k + 1 - NEAR, k + 1)).mean()
+                        for k in range(len(steps))])
+    for k in np.argsort(-steps / around, kind="stable"):
+        if steps[k] < CUT * around[k]:
+            break
+        elsewhere = np.delete(changes, np.s_[max(0, k - NEAR):k + NEAR + 1])
+        if not len(elsewhere) or changes[k] > LASTING * np.median(elsewhere):
+            return int(k) + 1
+    return 0
+
+
+def _mean(luma: np.ndarray, first: int, last: int) -> np.ndarray:
+    return luma[max(0, first):last].mean(axis=0, dtype=np.float32)

@@ -22,6 +22,8 @@ FAMILIES: dict[str, Callable[..., Clip]] = {
 SHARES = {"fall": 40, "white-water": 30, "river": 25, "fire": 13, "smoke": 11, "cloud": 11, "bay": 8, "shallow": 7,
           "lake": 5}
 """How many of 150 clips are of each family."""
+PLACES = 1000
+"""Seeds of a family."""
 
 
 def clip(family: str, seed: int, frames: int = 96, size: tuple[int, int] = (320, 240), **variation: Any) -> Clip:
@@ -46,6 +48,11 @@ class Recipe:
     seed: int
     variation: Mapping[str, Any]
 
+    @property
+    def name(self) -> str:
+        """Of the catalogue: its family and its number there, from 1."""
+        return f"{self.family}-{self.seed % PLACES + 1:02d}"
+
     def clip(self, frames: int = 96, size: tuple[int, int] = (320, 240)) -> Clip:
         """The clip."""
         return clip(self.family, self.seed, frames, size, **self.variation)
@@ -62,7 +69,7 @@ def catalogue(count: int = 150) -> list[Recipe]:
     for _ in range(count):
         # nobody goes twice before all went once; then whoever is furthest behind its share is next
         family = min(SHARES, key=lambda name: (made[name] > 0, (made[name] + 0.5) / SHARES[name]))
-        seed = 1000 * list(SHARES).index(family) + made[family]
+        seed = PLACES * list(SHARES).index(family) + made[family]
         recipes.append(Recipe(family, seed, VARIATIONS[family](_spread(made[family]))))
         made[family] += 1
     return recipes

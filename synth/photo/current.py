@@ -17,7 +17,7 @@ from synth.photo.carried import sampled
 from synth.photo.tiles import enlarged, noise
 from synth.projection import project
 
-COARSE = 60  # rows: few enough that no library splits the solver's sums between threads
+CELLS = 9000  # few enough that no library splits the solver's sums between threads, which would round otherwise
 MARGIN = 8
 SMOOTH = 0.03
 
@@ -41,11 +41,13 @@ class Current:
 def past_stones(U: np.ndarray, distance: np.ndarray) -> np.ndarray:
     """A uniform flow U (2: x, y) past what lies where distance (Y, X) is negative: (Y, X, 2) float32.
 
-    The flow without eddies that does not pass through walls, found on about COARSE rows and smoothed over SMOOTH of
+    The flow without eddies that does not pass through walls, found on at most CELLS cells and smoothed over SMOOTH of
     the picture's height: what lies on the water is turned aside early, as the layer at a wall slows it.
     """
     U = np.asarray(U, np.float32)
-    factor = max(1, len(distance) // COARSE)
+    factor = 1
+    while np.prod([-(-n // factor) + 2 * MARGIN for n in distance.shape]) > CELLS:
+        factor += 1
     coarse = np.ascontiguousarray(distance[::factor, ::factor] / factor, np.float32)
     if not (coarse < 0).any():
         return np.array(np.broadcast_to(U, (*distance.shape, 2)))

@@ -9,12 +9,13 @@ Points are x, y in pixels, rows from the lowest; velocities are pixels per frame
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy import ndimage
 from scipy.interpolate import RBFInterpolator
 
+Interpolation = Callable[[np.ndarray, np.ndarray, tuple[int, int]], np.ndarray]
 SPACING = 8.0
 """Pixels between the points at which a stroke is read."""
 MOST = 2000
@@ -59,19 +60,45 @@ def orientation(strokes: Sequence[np.ndarray], shape: tuple[int, int], frozen: n
     """
     if not len(strokes):
         raise ValueError("an orientation map needs at least one stroke")
-    points, tangents = _thinned(*stroke_points(strokes))
+    points, tangents = _inside(*_thinned(*stroke_points(strokes)), shape)
+    return _by_part(points, tangents, shape, frozen, _directions)
+
+
+def speeds(strokes: Sequence[np.ndarray], given: Sequence[float], shape: tuple[int, int],
+           frozen: np.ndarray | None = None) -> np.ndarray:
+    """The speed map: (Y, X) float32, interpolated from one speed of each stroke; in their unit and range.
+
+    So a fall may be fast and its pool slow. strokes, frozen and errors as in `orientation`; ValueError too for another
+    number of speeds than of strokes.
+    """
+    if len(strokes) != len(given):
+        raise ValueError(f"{len(strokes)} strokes need {len(strokes)} speeds, not {len(given)}")
+    each = [stroke_points([stroke])[0] for stroke in strokes]
+    values = np.concatenate([np.full((len(points), 1), speed) for points, speed in zip(each, given, strict=True)])
+    points, values = _inside(*_thinned(np.concatenate(each), values), shape)
+    found = _by_part(points, values, shape, frozen, _values)[..., 0]
+    return np.clip(found, min(given), max(given)).astype(np.float32)
+
+
+def _inside(points: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """The points in the picture, with their values."""
     inside = ((points >= -0.5) & (points <= np.array(shape[::-1]) - 0.5)).all(axis=1)
     if not inside.any():
         raise ValueError(f"all strokes lie outside the picture of {shape[1]} x {shape[0]} pixels")
-    points, tangents = points[inside], tangents[inside]
-    found = _interpolated(points, tangents, shape)
+    return points[inside], values[inside]
+
+
+def _by_part(points: np.ndarray, values: np.ndarray, shape: tuple[int, int], frozen: np.ndarray | None,
+             interpolated: Interpolation) -> np.ndarray:
+    """Values (M, C) at points interpolated on a picture, in each part that `frozen` leaves from its own points."""
+    found = interpolated(points, values, shape)
     if frozen is not None and frozen.any():
         parts, count = ndimage.label(~frozen)
         x, y = np.rint(points).astype(int).T
         of = parts[y, x]
         for part in range(1, count + 1):
             if (of == part).any() and (of != part).any():
-                alone = _interpolated(points[of == part], tangents[of == part], shape)
+                alone = interpolated(points[of == part], values[of == part], shape)
                 found = np.where((parts == part)[..., None], alone, found)
     return found
 
@@ -85,20 +112,40 @@ def _thinned(points: np.ndarray, tangents: np.ndarray) -> tuple[np.ndarray, np.n
     return points[first], tangents[first]
 
 
-def _interpolated(points: np.ndarray, tangents: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+def _directions(points: np.ndarray, tangents: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Unit vectors (Y, X, 2) float32 through tangents (M, 2) at points (M, 2)."""
-    rows, columns = (max(2, -(-n // COARSE) + 1) for n in shape)
-    at = np.stack(np.meshgrid(np.arange(columns) * COARSE, np.arange(rows) * COARSE), axis=-1).reshape(-1, 2)
-    if len(points) == 1:
-        coarse = np.broadcast_to(tangents, (len(at), 2))
-    else:
-        scale = float(max(shape))
-        spline = RBFInterpolator(points / scale, tangents, kernel="linear", degree=0, smoothing=SMOOTHING)
-        coarse = spline(at / scale)
+    at = _coarse(shape)
+    coarse = _spline(points, tangents, at, max(shape))
     nearest = tangents[((at[:, None] - points) ** 2).sum(axis=2).argmin(axis=1)]
     size = np.hypot(*coarse.T)
-    coarse = np.where(size[:, None] > 1e-2, coarse / np.maximum(size, 1e-2)[:, None], nearest).reshape(rows, columns, 2)
-    y, x = np.mgrid[:shape[0], :shape[1]] / COARSE
-    fine = np.stack([ndimage.map_coordinates(coarse[..., c], [y, x], order=1, mode="nearest") for c in (0, 1)], axis=-1)
+    fine = _fine(np.where(size[:, None] > 1e-2, coarse / np.maximum(size, 1e-2)[:, None], nearest), shape)
     size = np.hypot(fine[..., 0], fine[..., 1])[..., None]
     return np.where(size > 1e-6, fine / np.maximum(size, 1e-6), [1.0, 0.0]).astype(np.float32)
+
+
+def _values(points: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Numbers (Y, X, C) float32 through values (M, C) at points (M, 2)."""
+    return _fine(_spline(points, values, _coarse(shape), max(shape)), shape).astype(np.float32)
+
+
+def _coarse(shape: tuple[int, int]) -> np.ndarray:
+    """Every COARSE-th point of a picture, and those beyond its end: (N, 2) x, y."""
+    rows, columns = (max(2, -(-n // COARSE) + 1) for n in shape)
+    return np.stack(np.meshgrid(np.arange(columns) * COARSE, np.arange(rows) * COARSE), axis=-1).reshape(-1, 2)
+
+
+def _spline(points: np.ndarray, values: np.ndarray, at: np.ndarray, scale: float) -> np.ndarray:
+    """Values (N, C) at points `at` of the radial basis function through values (M, C)."""
+    if len(points) == 1:
+        return np.broadcast_to(values, (len(at), values.shape[1]))
+    return np.asarray(RBFInterpolator(points / scale, values, kernel="linear", degree=0, smoothing=SMOOTHING)(
+        at / scale))
+
+
+def _fine(coarse: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Values (N, C) at the points of `_coarse`, bilinear at each pixel: (Y, X, C) float64."""
+    rows, columns = (max(2, -(-n // COARSE) + 1) for n in shape)
+    y, x = np.mgrid[:shape[0], :shape[1]] / COARSE
+    planes = coarse.reshape(rows, columns, -1)
+    return np.stack([ndimage.map_coordinates(planes[..., c], [y, x], order=1, mode="nearest")
+                     for c in range(planes.shape[2])], axis=-1)

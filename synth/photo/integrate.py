@@ -4,25 +4,28 @@ band, and the motion field of the animation.
 "Our strategy for seamless integration is to decompose a video example piece into its average image and differences. …
 We apply an image pyramid [BA83] and perform alpha blending for each sub-band."
 
-Weights of a pixel have squares that add up to one, not sums: differences of two clips have nothing in common, and a
-mean of two of them has 0.7 of their deviation. Fine bands change hands over a short way, coarse ones over a long one.
+Weights of a pixel have squares that add up to one, not sums as in the paper: differences of two clips have nothing in
+common, and a mean of two of them has 0.7 of their deviation. Fine bands change hands over a short way, coarse ones over
+a long one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from synth.photo.assign import Nodes, Shown
-from synth.photo.pieces import VERSIONS, Cut, pixels
+from synth.photo.pieces import FITS, VERSIONS, Cut, pixels, scaled
 
 BANDS = 3
 """Of the differences: below 1, 2 and 4 pixels of σ, the last with all that is coarser."""
 FEATHER = (0.25, 0.5, 1.0)
 """Of each band, over the overlap of two pieces: the way on which its weight falls to zero."""
 
+Blending = Literal["roots", "shares"]
 Frames = Callable[[int], np.ndarray]
 """Of each clip of the database its frames (T, Y, X) uint8."""
 
@@ -34,8 +37,8 @@ class Differences:
     bands: np.ndarray
 
 
-def differences(of: Nodes, shown: Shown, frames: Frames, shape: tuple[int, int], cut: Cut, length: int,
-                seed: int) -> Differences:
+def differences(of: Nodes, shown: Shown, frames: Frames, shape: tuple[int, int], cut: Cut, length: int, seed: int,
+                blending: Blending = "roots") -> Differences:
     """The differences of the assigned pieces on a target of `shape` (Y, X), `length` frames that loop.
 
     1. Of each node: its piece's frames less their average. A clip that is shorter repeats, one that is longer is cut
@@ -44,18 +47,35 @@ def differences(of: Nodes, shown: Shown, frames: Frames, shape: tuple[int, int],
     2. Its bands, each with the weight that belongs to it.
     """
     total = np.zeros((BANDS, length, *shape), np.float32)
-    share = weights(of, shape, cut)
+    share = weights(of, shape, cut, blending)
     start = phases(of, shown, seed)
-    for p, (y, x) in enumerate(of.corner.tolist()):
+    for p, piece in read(shown, frames, cut):
         # 1. differences
-        corner = (int(shown.corner[p, 0]), int(shown.corner[p, 1]))
-        piece = pixels(frames(int(shown.clip[p])), corner, cut, VERSIONS[int(shown.version[p])]).astype(np.float32)
-        piece = looped(piece - piece.mean(axis=0), length, int(start[p]))
+        moves = looped(piece - piece.mean(axis=0), length, int(start[p]))
         # 2. bands
-        inside, part = _visible(y, x, shape, cut)
-        for band, values in enumerate(bands(piece)):
+        inside, part = _visible(int(of.corner[p, 0]), int(of.corner[p, 1]), shape, cut)
+        for band, values in enumerate(bands(moves)):
             total[(band, slice(None), *inside)] += share[p][band][part] * values[(slice(None), *part)]
     return Differences(total)
+
+
+def read(shown: Shown, frames: Frames, cut: Cut) -> Iterator[tuple[int, np.ndarray]]:
+    """The nodes and the frames (T, size, size) float32 of their pieces."""
+    for p, small, shape in by_clip(shown, frames):
+        corner = (int(shown.corner[p, 0]), int(shown.corner[p, 1]))
+        found = pixels(small, shape, corner, cut, VERSIONS[int(shown.version[p])], FITS[int(shown.fit[p])])
+        yield p, found.astype(np.float32)
+
+
+def by_clip(shown: Shown, frames: Frames) -> Iterator[tuple[int, np.ndarray, tuple[int, int]]]:
+    """The nodes, so that each clip is scaled once: their clip at the scale of their version, and its whole shape."""
+    scales = np.array([version.scale for version in VERSIONS])[shown.version]
+    last, small = (-1, 0.0), np.empty(0)
+    for p in np.lexsort((scales, shown.clip)).tolist():
+        clip = frames(int(shown.clip[p]))
+        if last != (last := (int(shown.clip[p]), float(scales[p]))):
+            small = scaled(clip, float(scales[p]))
+        yield p, small, (clip.shape[1], clip.shape[2])
 
 
 def bands(values: np.ndarray) -> list[np.ndarray]:
@@ -112,22 +132,24 @@ def phases(of: Nodes, shown: Shown, seed: int) -> np.ndarray:
     return np.asarray(start[group], np.int64)
 
 
-def weights(of: Nodes, shape: tuple[int, int], cut: Cut) -> np.ndarray:
-    """The weight of each node in each band: (P, BANDS, size, size) float32. Their squares add up to 1 at each pixel.
+def weights(of: Nodes, shape: tuple[int, int], cut: Cut, blending: Blending = "roots") -> np.ndarray:
+    """The weight of each node in each band: (P, BANDS, size, size) float32. By `blending`, "roots": their squares add
+    up to 1 at each pixel; "shares": they do, as in the paper.
 
     A product of two ramps, which are 0 at a piece's border and 1 half of FEATHER's way past the middle of an overlap.
     """
+    power = 2 if blending == "roots" else 1
     ramps = np.stack([_ramp(cut, feather) for feather in FEATHER])
     window = ramps[:, :, None] * ramps[:, None, :]
     total = np.zeros((BANDS, *shape))
     for y, x in of.corner.tolist():
         inside, part = _visible(y, x, shape, cut)
-        total[(slice(None), *inside)] += window[(slice(None), *part)] ** 2
+        total[(slice(None), *inside)] += window[(slice(None), *part)] ** power
     found = np.zeros((len(of.corner), *window.shape), np.float32)
     for p, (y, x) in enumerate(of.corner.tolist()):
         inside, part = _visible(y, x, shape, cut)
-        found[(p, slice(None), *part)] = window[(slice(None), *part)] / np.sqrt(
-            np.maximum(total[(slice(None), *inside)], 1e-12))
+        found[(p, slice(None), *part)] = window[(slice(None), *part)] / np.maximum(
+            total[(slice(None), *inside)], 1e-12) ** (1 / power)
     return found
 
 

@@ -58,10 +58,29 @@ def motion(flow: np.ndarray, mean: np.ndarray | None = None) -> Motion:
     """
     average = flow.mean(axis=0) if mean is None else mean
     speed = np.hypot(average[..., 0], average[..., 1])
-    cells = np.stack([in_cells(frame) for frame in flow])
-    power = np.abs(np.fft.rfft(cells, axis=0) / len(flow)) ** 2
+    power = _power(flow)
     bands = np.sqrt(np.stack([2 * power[low:high].sum(axis=(0, 3)) for low, high in octaves(len(flow))], axis=-1))
     return Motion(in_cells(average), bands.astype(np.float32), in_cells((speed >= SIGNIFICANT).astype(np.float32)))
+
+
+def spectrum(flow: np.ndarray, mean: np.ndarray | None = None) -> np.ndarray:
+    """Amplitude of the motion at each frequency (fig. 6): (T // 2 + 1,) float64, pixels per frame, of a flow
+    (T, Y, X, 2) in pixels per frame.
+
+    The root of the power of Eq. 2, positive and negative frequency together, averaged over the cells. f = 0 is the mean
+    motion: `mean` (Y, X, 2) where it is known, else that of the flow.
+    """
+    power = _power(flow).sum(axis=3).mean(axis=(1, 2))
+    power[1:(len(flow) + 1) // 2] *= 2
+    if mean is not None:
+        power[0] = (in_cells(mean).astype(np.float64) ** 2).sum(axis=2).mean()
+    return np.sqrt(power)
+
+
+def _power(flow: np.ndarray) -> np.ndarray:
+    """The power of both components of a flow (T, Y, X, 2) at each frequency: (T // 2 + 1, R, C, 2) on cells."""
+    cells = np.stack([in_cells(frame) for frame in flow])
+    return np.asarray(np.abs(np.fft.rfft(cells, axis=0) / len(flow)) ** 2)
 
 
 def octaves(frames: int) -> list[tuple[int, int]]:

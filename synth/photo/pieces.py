@@ -34,6 +34,15 @@ class Version(NamedTuple):
     flipped: bool
 
 
+class Fit(NamedTuple):
+    """A piece turned in its place counter-clockwise by degrees and enlarged, beyond its version."""
+
+    turn: float
+    zoom: float
+
+
+FITS = (Fit(0.0, 1.0), *(Fit(*of) for of in product((-11.25, 0.0, 11.25), (0.85, 1.0, 1.18)) if of != (0.0, 1.0)))
+"""How a piece may be fitted to the target; the first changes nothing."""
 VERSIONS = tuple(Version(*of) for of in product(SCALES, TURNS, (False, True)))
 
 
@@ -86,11 +95,18 @@ def to_clip(shape: tuple[int, int], version: Version) -> np.ndarray:
 
 def turned_vectors(vectors: np.ndarray, version: Version) -> np.ndarray:
     """Velocities (..., 2) of a clip, in pixels of the version: float32."""
-    angle = np.radians(version.turn)
-    cos, sin = np.cos(angle), np.sin(angle)
-    x, y = version.scale * (cos * vectors[..., 0] - sin * vectors[..., 1]), version.scale * (
-        sin * vectors[..., 0] + cos * vectors[..., 1])
-    return np.stack([-x if version.flipped else x, y], axis=-1).astype(np.float32)
+    found = version.scale * _rotated(vectors, version.turn)
+    return (found * [-1 if version.flipped else 1, 1]).astype(np.float32)
+
+
+def fitted_vectors(vectors: np.ndarray, fit: Fit) -> np.ndarray:
+    """Velocities (..., 2) of a piece, when it is fitted: float32."""
+    return (fit.zoom * _rotated(vectors, fit.turn)).astype(np.float32)
+
+
+def _rotated(vectors: np.ndarray, degrees: float) -> np.ndarray:
+    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.stack([cos * vectors[..., 0] - sin * vectors[..., 1], sin * vectors[..., 0] + cos * vectors[..., 1]], -1)
 
 
 def inside(corners: np.ndarray, cut: Cut, shape: tuple[int, int], version: Version) -> np.ndarray:
@@ -133,18 +149,21 @@ def of_scaled(shape: tuple[int, int], version: Version) -> np.ndarray:
     return to_clip(canvas(shape, version), Version(1.0, version.turn, version.flipped))
 
 
-def pixels(frames: np.ndarray, corner: tuple[int, int], cut: Cut, version: Version) -> np.ndarray:
-    """The frames of one piece: (T, size, size) uint8 of a clip's (T, Y, X) uint8.
+def scaled(frames: np.ndarray, scale: float) -> np.ndarray:
+    """The frames of a clip (T, Y, X) uint8 at a scale of at most 1."""
+    return frames if scale == 1 else np.stack([shrunk(frame, scale) for frame in frames])
 
-    1. The part of the clip that the piece covers, scaled.
-    2. Turned and mirrored.
+
+def pixels(small: np.ndarray, shape: tuple[int, int], corner: tuple[int, int], cut: Cut, version: Version,
+           fit: Fit = FITS[0]) -> np.ndarray:
+    """The frames of one piece: (T, size, size) uint8, turned, mirrored and fitted.
+
+    small  (T, y, x) uint8: the clip of `shape` (Y, X), `scaled` as the version is
     """
-    shape = (frames.shape[1], frames.shape[2])
     at = of_scaled(shape, version)
-    # 1. scaled: what INTER_AREA averages
-    small = frames if version.scale == 1 else np.stack([shrunk(frame, version.scale) for frame in frames])
-    # 2. turned
-    moved = at.copy()
-    moved[:, 2] += at[:, :2] @ np.array(corner[::-1], np.float64)
-    stacked = np.moveaxis(small, 0, -1)
-    return np.moveaxis(warped(stacked, (cut.size, cut.size), moved), -1, 0)
+    cos, sin = np.cos(np.radians(fit.turn)) / fit.zoom, np.sin(np.radians(fit.turn)) / fit.zoom
+    middle = np.full(2, (cut.size - 1) / 2)
+    back = np.array([[cos, sin], [-sin, cos]])
+    start = np.array(corner[::-1], np.float64) + middle - back @ middle
+    at = np.concatenate([at[:, :2] @ back, (at[:, :2] @ start + at[:, 2])[:, None]], axis=1)
+    return np.moveaxis(warped(np.moveaxis(small, 0, -1), (cut.size, cut.size), at), -1, 0)

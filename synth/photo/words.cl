@@ -1,13 +1,18 @@
-// What two histograms have in common, words.py's Eq. 1: out (P, N) ushort, sums of the least of two counts.
-// ours (P, 16 blocks), theirs (N, 16 blocks) uchar. One work-item is a pair. Counts of a histogram are below 2^16 in all.
-kernel void common(global const uchar *restrict ours, global const uchar *restrict theirs, const int blocks,
-                   global ushort *restrict out) {
-    const int n = get_global_id(0), p = get_global_id(1), count = get_global_size(0);
-    ushort16 sum = (ushort16)(0);
-    for (int k = 0; k < blocks; k++)
-        sum += convert_ushort16(min(vload16(p * blocks + k, ours), vload16(n * blocks + k, theirs)));
-    const ushort8 eight = sum.lo + sum.hi;
-    const ushort4 four = eight.lo + eight.hi;
-    const ushort2 two = four.lo + four.hi;
-    out[p * count + n] = two.x + two.y;
+// Eq. 1 of words.py: of each of `nodes` histograms, how many points it has in common with each of TILE others.
+// first (nodes + 1): where a histogram's words begin in `word` and `count`; only those that it has are there.
+// theirs (tiles, words, TILE) uchar, counts. out (nodes, tiles, TILE). One work-item is a tile. Sums are below 256.
+kernel void common(global const int *restrict first, global const ushort *restrict word,
+                   global const uchar *restrict count, global const uchar16 *restrict theirs, const int words,
+                   const int nodes, global uchar16 *restrict out) {
+    const size_t tile = get_global_id(0), tiles = get_global_size(0);
+    global const uchar16 *own = theirs + tile * words * (TILE / 16);
+    for (int p = 0; p < nodes; p++) {
+        uchar16 sum[TILE / 16];
+        for (int j = 0; j < TILE / 16; j++) sum[j] = 0;
+        for (int k = first[p]; k < first[p + 1]; k++) {
+            const uchar16 most = count[k];
+            for (int j = 0; j < TILE / 16; j++) sum[j] += min(own[word[k] * (TILE / 16) + j], most);
+        }
+        for (int j = 0; j < TILE / 16; j++) out[(p * tiles + tile) * (TILE / 16) + j] = sum[j];
+    }
 }

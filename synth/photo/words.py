@@ -6,7 +6,8 @@ laid over a whole picture, GRID points to the edge of a piece, and pieces that o
 
 Descriptors and words are whole numbers, 0..255, so that all sums are exact: the same bits at any number of threads.
 
-Hot: `common`, a byte minimum and an addition for each word of each pair of pieces; bound by arithmetic.
+Hot: `common`, a byte minimum and an addition for each word of a piece of the target and each piece of the database;
+bound by arithmetic.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ ROUNDS = 12
 QUADRANTS = 4
 TOTAL = 2 * (GRID + 1) ** 2
 """What two equal histograms have in common: each point counts on both levels of the pyramid."""
+TILE = 64
+"""Histograms that a work-item compares with."""
 CONTEXT = 0.5
 """Edge of a descriptor's window over that of a piece. A larger one would see more than its piece."""
 
@@ -133,22 +136,24 @@ def histograms(nearest: np.ndarray, corners: np.ndarray, words: int) -> np.ndarr
 
 
 def common(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
-    """Eq. 1, I = Σ min: what histograms ours (P, C) and theirs (N, C) uint8 have in common: (P, N) float32, in 0..1."""
-    count = -(-ours.shape[1] // 16) * 16
-    program = opencl.program(Path(__file__).with_suffix(".cl"))
-    out = opencl.empty((len(ours), len(theirs)), np.uint16)
-    program.common((len(theirs), len(ours)), None, opencl.to_device(_padded(ours, count)),
-                   opencl.to_device(_padded(theirs, count)), np.int32(count // 16), out)
-    return out.get().astype(np.float32) / np.float32(TOTAL)
+    """Eq. 1, I = Σ min: points that histograms ours (P, C) and theirs (N, C) uint8 have in common: (P, N) uint8.
 
-
-def _padded(rows: np.ndarray, count: int) -> np.ndarray:
-    wide = np.zeros((len(rows), count), np.uint8)
-    wide[:, :rows.shape[1]] = rows
-    return wide
+    Of TOTAL; I is that share. Only the words that a histogram has are looked at, a tenth of all.
+    """
+    count, words = theirs.shape
+    tiles = -(-count // TILE)
+    tiled = np.zeros((tiles * TILE, words), np.uint8)
+    tiled[:count] = theirs
+    tiled = np.ascontiguousarray(tiled.reshape(tiles, TILE, words).swapaxes(1, 2))
+    node, word = np.nonzero(ours)
+    first = np.searchsorted(node, np.arange(len(ours) + 1)).astype(np.int32)
+    out = opencl.empty((len(ours), tiles * TILE), np.uint8)
+    opencl.program(Path(__file__).with_suffix(".cl"), TILE=TILE).common(
+        (tiles,), None, opencl.to_device(first), opencl.to_device(word.astype(np.uint16)),
+        opencl.to_device(ours[node, word]), opencl.to_device(tiled), np.int32(words), np.int32(len(ours)), out)
+    return np.ascontiguousarray(out.get()[:, :count])
 
 
 def common_reference(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
     """Specification of `common`."""
-    shared = np.stack([np.minimum(row, theirs).sum(axis=1, dtype=np.int64) for row in ours])
-    return shared.astype(np.float32) / np.float32(TOTAL)
+    return np.stack([np.minimum(row, theirs).sum(axis=1, dtype=np.int64) for row in ours]).astype(np.uint8)

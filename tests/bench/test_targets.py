@@ -14,6 +14,10 @@ TEXTURES = ("canes on circles", "straw on vortices", "brick on waves")
 LOOP = {"last to first": 0.99, "std, min": 0.97, "std, max": 1.01, "grad, min": 0.9, "grad, max": 0.99,
         "hist, max": 0.05}
 SECONDS = {"first frame, wall s": 0.4, "first frame, processor s": 0.3, "wall ms": 20, "processor ms": 15}
+FLOWING = {"way": "ours", "nodes": 48, "low-pass": 3.1, "1 px": 0.92, "2 px": 1.01, "4 px": 0.97,
+           "angle to strokes": 9.0, "deviation": 1.04, "gradient": 0.97, "edges": None, "loop": 1.05}
+TRUE = {"angle": 12.0, "angle of the clip's own flow": 7.0, "spectrum": 0.2}
+ENERGIES = {"data term alone": 115.2, "α-expansion": 100.4, "ICM": 98.7, "TRW-S": 95.7}
 DISTANCES = {"pair correlation": 0.05, "motion spectrum": None, "nearest distance": 0.02}
 FOUND: dict[str, dict[str, Any]] = {
     "synthesis": {f"{search}, {frame}": TIMES for search in ("exact", "k-coherence") for frame in ("first", "next")} | {
@@ -61,6 +65,16 @@ FOUND: dict[str, dict[str, Any]] = {
                 "against the reference": {"size": "256²", "ours": TIMES, "reference": TIMES,
                                           "largest difference": 0.0}},
     "loops": {"period": 120, "loops": [{"texture": name, **LOOP} for name in TEXTURES]},
+    "photo": {"look": [{"target": "stream", **FLOWING}, {"target": "river", **FLOWING, "edges": 0.97},
+                       {"target": "river", **FLOWING, "way": "the clip itself", "edges": 0.99},
+                       {"target": "stream", **FLOWING, "way": "differences alone", "low-pass": 9.0, "loop": None}],
+              "truth": [{"target": "fall", "strokes": "without", **TRUE}, {"target": "fall", "strokes": "with", **TRUE},
+                        {"target": "river", "strokes": "without", **TRUE, "angle": 175.0}],
+              "minimizers": [{"target": "stream", "nodes": 76, **ENERGIES}],
+              "times": {"size": "640 × 480", "clips": 150, "frames": 96, "assignment, s": 8.0, "integration, s": 9.0,
+                        "composition, s": 7.0, "all, s": 24.0, "peak memory MB": 2100},
+              "product": {"width": 640, **TIMES}, "analysis": {"clips": 30, "of": 150, **TIMES},
+              "bits": {"runs": 6, "different results": 1}},
 }
 
 
@@ -171,3 +185,43 @@ def test_fidelity_names_the_worst_scene_and_sets_no_target() -> None:
     rows = list(targets.fidelity(FOUND["fidelity"]))
     assert [row.cells[2:4] for row in rows] == [("no target", "")] * 3
     assert rows[1].measured == "7.0% off (ma13-fig05 pure)"
+
+
+@pytest.mark.parametrize(("key", "value", "what", "measured"), [
+    ("low-pass", 5.1, "blurred by 8 pixels", "worst 5.1 (river); 1 of 2 within"),
+    ("2 px", 1.17, "contrast of bands", "worst 1.17 (2 px, river); 1 of 2 within"),
+    ("4 px", 0.83, "contrast of bands", "worst 0.83 (4 px, river); 1 of 2 within"),
+    ("angle to strokes", 16.0, "angle of the flow", "worst 16° (river); 1 of 2 within"),
+    ("deviation", 0.74, "deviation between pieces", "worst 0.74 (river); 1 of 2 within"),
+    ("gradient", 1.3, "gradient on the lines", "worst 1.30 (river); 1 of 2 within"),
+    ("gradient", None, "gradient on the lines", "worst nan (river); 1 of 2 within"),
+    ("edges", 0.6, "correlation of gradients", "worst 0.60 (river); 0 of 1 within"),
+    ("loop", 1.3, "last to first", "worst 1.30 (river); 1 of 2 within")])
+def test_one_bad_picture_misses_one_target_and_is_named(key: str, value: Any, what: str, measured: str) -> None:
+    rows = [row | {key: value} if (row["target"], row["way"]) == ("river", "ours") else row
+            for row in FOUND["photo"]["look"]]
+    missed = [row for row in targets.photo(FOUND["photo"] | {"look": rows}) if row.verdict == "MISSED"]
+    assert [row.measured for row in missed] == [measured]
+    assert what in missed[0].what
+
+
+@pytest.mark.parametrize(("key", "changes", "missed"), [
+    ("truth", {"angle": 18.0, "target": "fall"}, "worst 18° (fall); 0 of 1 within"),  # 20 without
+    ("times", {"assignment, s": 15.1}, "15.1 s"),
+    ("times", {"all, s": 36.2}, "36.2 s (assignment 8.0, integration 9.0, composition 7.0)"),
+    ("times", {"peak memory MB": 3001}, "3001 MB"),
+    ("analysis", {"wall": 121.0}, "10.1 min (30 of 150 clips, 121 s, at that rate)"),
+    ("minimizers", {"TRW-S": 101.0}, "101"),
+    ("bits", {"different results": 2}, "2 different results in 6 runs")])
+def test_a_photo_s_truth_times_and_bits_have_targets(key: str, changes: dict[str, Any], missed: str) -> None:
+    before = FOUND["photo"][key]
+    after = [row | changes for row in before] if isinstance(before, list) else before | changes
+    rows = targets.photo(FOUND["photo"] | {key: after})
+    assert [row.measured for row in rows if row.verdict == "MISSED"] == [missed]
+
+
+def test_another_way_is_shown_beside_ours_of_the_same_targets_and_sets_no_target() -> None:
+    row = next(row for row in targets.photo(FOUND["photo"]) if "differences alone" in row.what)
+    assert row.met is None
+    assert row.measured.startswith("low-pass 9.0") and row.measured.endswith("loop nan")
+    assert row.reference.startswith("ours: low-pass 3.1")

@@ -22,3 +22,9 @@ def test_it_is_silent_where_no_terminal_is(capsys: pytest.CaptureFixture[str]) -
     with Progress().task("synth H", 3) as advance:
         advance()
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_note_is_told_also_in_a_log_but_not_to_who_wants_quiet(capsys: pytest.CaptureFixture[str]) -> None:
+    Progress().note("x.toml: clips: few")
+    Progress(quiet=True).note("x.toml: clips: none")
+    assert capsys.readouterr().err == "x.toml: clips: few\n"

@@ -60,3 +60,19 @@ def test_the_grid_lies_inside_and_even() -> None:
     assert rows.max() < 32
     assert columns.max() < 64
     np.testing.assert_allclose(places[0], [(columns[0] + 0.5) * 200 / 64, (rows[0] + 0.5) * 100 / 32])
+
+
+def test_an_arrow_along_a_stroke_follows_its_bends_and_ends_where_it_does() -> None:
+    stroke = np.array([[10.0, 10.0], [40.0, 10.0], [40.0, 34.0]])
+    x, y = ink(arrows.along(GREY, [stroke], 3.0, arrows.RED))
+    assert x.min() == 9 or x.min() == 8  # the round end of the shaft
+    assert 31 <= y.max() <= 33  # the tip is narrower than a pixel
+    assert ((y < 20) & (x < 36)).sum() > 45  # along the first part
+    head, shaft = x[(y > 22) & (y < 27)], x[(y > 14) & (y < 19)]
+    assert np.ptp(head) > np.ptp(shaft) + 2
+
+
+def test_a_stroke_shorter_than_a_head_is_a_head_that_ends_with_it() -> None:
+    x, y = ink(arrows.along(GREY, [np.array([[30.0, 20.0], [32.0, 20.0]])], 3.0, arrows.RED))
+    assert x.max() <= 32 and x.min() < 30
+    assert abs(y.mean() - 19.5) < 0.6

@@ -116,7 +116,7 @@ def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match=reason):
             pictures.write(tmp_path / "a.png", picture)
     huge = png(tmp_path / "huge.png", np.zeros((1, pictures.LARGEST + 1), np.uint8), 0)
-    with pytest.raises(BadInput, match="the largest side read"):
+    with pytest.raises(BadInput, match="16384 a side are the most"):
         pictures.read_foreign(huge, "exemplar.file")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["huge.png"]
 
@@ -150,3 +150,28 @@ def test_resizing_keeps_a_plain_colour_and_the_way_up() -> None:
     half[:4] = 1  # white on top
     small = pictures.resized(half, 4, 4)
     assert small.shape == (4, 4, 3) and small[0].min() > 0.9 and small[-1].max() < 0.1
+
+
+@pytest.mark.parametrize(("size", "scaled"), [((120, 80), (60, 40)), ((1280, 852), (240, 160)), ((60, 40), (120, 80))])
+def test_the_triangle_kernel_does_not_overshoot(size: tuple[int, int], scaled: tuple[int, int]) -> None:
+    """A mask stays black far from what is white, and white inside it."""
+    mask = np.zeros((size[1], size[0], 1), np.float32)
+    mask[:, size[0] // 2:] = 1
+    small = pictures.resized(mask, *scaled, "triangle")[..., 0]
+    middle, reach = scaled[0] // 2, 2
+    np.testing.assert_array_equal(small[:, :middle - reach], 0)
+    np.testing.assert_allclose(small[:, middle + reach:], 1, atol=1e-6)
+    assert (np.diff(small, axis=1) >= -1e-6).all()
+
+
+def test_a_picture_many_times_as_large_is_averaged_before_it_is_filtered(tmp_path: Path) -> None:
+    """A ramp stays one, in its place; grain of single pixels becomes its mean."""
+    ramp = np.linspace(0, 1, 1003)[None, :, None] * np.ones((701, 1, 3))
+    grain = np.random.default_rng(1).random((701, 1003, 1)) * 0.2 - 0.1
+    pictures.write(tmp_path / "a.png", (0.8 * ramp + 0.1 + grain).astype(np.float32))
+    read = pictures.read_scaled(tmp_path / "a.png", "photo.file", 20, 1.0, 2000)
+    assert read.of == (701, 1003) and read.picture.shape == (14, 20, 3)
+    expected = 0.8 * (np.arange(20) + 0.5) / 20 + 0.1
+    np.testing.assert_allclose(read.picture[7, 2:-2, 1], expected[2:-2], atol=0.005)
+    with pytest.raises(BadInput, match=r"a\.png: photo\.file: has 1003 x 701 pixels; 1000 a side are the most"):
+        pictures.read_scaled(tmp_path / "a.png", "photo.file", 20, 1.0, 1000)

@@ -6,6 +6,7 @@ from typing import Any
 
 import av
 import cv2
+import footage
 import numpy as np
 import pytest
 
@@ -158,3 +159,41 @@ def test_a_full_disk_is_noticed(tiny_disk: Path) -> None:
     with pytest.raises(StorageFailed, match="disk"):
         video.write(tiny_disk / "a.mp4", noise, 30.0, crf=4)
     assert list(tiny_disk.iterdir()) == []
+
+
+@pytest.mark.parametrize(("matrix", "top", "left"), [
+    ((1, 0, 0, 1), "white", "black"), ((0, 1, -1, 0), "black", "grey"), ((-1, 0, 0, -1), "grey", "grey"),
+    ((0, -1, 1, 0), "grey", "white"), ((-1, 0, 0, 1), "white", "grey")])
+def test_a_clip_is_turned_as_a_player_shows_it(tmp_path: Path, matrix: tuple[int, ...], top: str, left: str) -> None:
+    """By its display matrix, mirrors too. The stored picture is white above, black to the left, grey elsewhere."""
+    picture = np.full((64, 96, 3), 128, np.uint8)
+    picture[:, :24] = 0
+    picture[:16] = 255
+    path = tmp_path / "a.mp4"
+    video.write(path, [picture] * 3, 24.0)
+    footage.turn(path, matrix)
+    grey = video.read_timed(path, "clips.files[0]", 10, 640).luma[1][::-1]
+    assert grey.shape == ((96, 64) if matrix[0] == 0 else (64, 96))
+    np.testing.assert_allclose(video.read_grey(path, "coarse.file")[1][::-1], grey / 255, atol=0.01)
+    shown = {"white": 255, "black": 0, "grey": 128}
+    assert abs(np.median(grey[3]) - shown[top]) < 6
+    assert abs(np.median(grey[:, 3]) - shown[left]) < 6
+
+
+def test_a_clip_of_too_many_frames_is_refused_and_a_large_one_scaled(tmp_path: Path) -> None:
+    video.write(tmp_path / "a.mp4", frames(12), 30.0)
+    with pytest.raises(BadInput, match=r"a\.mp4: clips: more than 11 frames; cut the clip"):
+        video.read_timed(tmp_path / "a.mp4", "clips", 11, 640)
+    read = video.read_timed(tmp_path / "a.mp4", "clips", 12, 49)
+    assert read.luma.shape == (12, 33, 49)
+    np.testing.assert_allclose(read.times, np.arange(12) / 30, atol=1e-3)
+
+
+def test_a_clip_cut_short_is_told_wherever_it_ends(tmp_path: Path) -> None:
+    path = tmp_path / "a.mp4"
+    video.write(path, frames(12), 30.0)
+    content = path.read_bytes()
+    for share in (0.3, 0.5, 0.8, 0.99):
+        path.write_bytes(content[:int(share * len(content))])
+        with pytest.raises(BadInput, match=r"cut short|no video"):
+            video.read_timed(path, "clips", 100, 640)

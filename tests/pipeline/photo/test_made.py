@@ -33,7 +33,7 @@ def test_a_file_makes_nothing(tmp_path: Path) -> None:
 def test_all_that_shows_the_target_is_made_from_it(tmp_path: Path) -> None:
     artifacts = {artifact.name: artifact for artifact in METHOD.artifacts(scene(tmp_path, MADE))}
     needing = {name for name, artifact in artifacts.items() if "made" in dict(artifact.inputs)}
-    assert needing == {"assignment", "fluid", "mattes", "frames", "target"}
+    assert needing == {"assignment", "fluid", "mattes", "frames", "target-picture"}
     assert artifacts["made"].shared
 
 

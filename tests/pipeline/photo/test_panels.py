@@ -4,13 +4,13 @@ from pathlib import Path
 
 from tiny import PHOTO, changed, scene
 
-from pipeline.photo.panels import panels
+from pipeline.photo.panels import panels, view_artifacts
 
 
 def test_each_name_is_its_artifact(tmp_path: Path) -> None:
     found = panels(scene(tmp_path, PHOTO))
     assert [(p.label, p.artifact, p.legend) for p in found] == [
-        ("target", "target", False), ("matte", "mattes", False), ("motion", "motion", True),
+        ("target", "target-picture", False), ("matte", "mattes", False), ("motion", "motion-picture", True),
         ("result", "frames", False)]
 
 
@@ -20,3 +20,22 @@ def test_with_moments_the_still_has_one_result_and_one_matte_for_each(tmp_path: 
         ("target", 0, "both"), ("matte of frame 1", 1, "still"), ("matte of frame 3", 3, "still"),
         ("matte", 0, "animation"), ("motion", 0, "both"),
         ("frame 1", 1, "still"), ("frame 3", 3, "still"), ("result", 0, "animation")]
+
+
+PIECES = changed(PHOTO, '["target", "matte", "motion", "result"]\npanel = 32',
+                 '["target", "piece", "spectrum", "strokes", "average", "result"]\npanel = 32\n'
+                 'pieces = [["cloud-01", 0.5, 0.5], ["cloud-01", 0.25, 0.5]]')
+
+
+def test_panels_of_pieces_stand_in_turn_as_far_as_they_follow_each_other(tmp_path: Path) -> None:
+    one = scene(tmp_path, PIECES)
+    found = [panel.artifact for panel in panels(one)]
+    assert found == ["target-picture", "piece-1-picture", "spectrum-1-picture", "piece-2-picture", "spectrum-2-picture",
+                     "strokes-picture", "average-1-picture", "average-2-picture", "frames"]
+    assert [artifact.name for artifact in view_artifacts(one)] == found[:-1]
+
+
+def test_a_panel_that_stands_twice_is_made_once(tmp_path: Path) -> None:
+    one = scene(tmp_path, changed(PHOTO, '"matte"', '"target"'))
+    assert len(panels(one)) == 4
+    assert [artifact.name for artifact in view_artifacts(one)] == ["target-picture", "motion-picture"]

@@ -1,6 +1,7 @@
 """The target: its parts at the scene's width, and one line for each that is no use."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from tiny import PHOTO, changed, scene
 from pipeline import cli
 from pipeline.errors import BadInput, InvalidValue
 from pipeline.files import pictures
-from pipeline.photo.target import check_target, read_target
+from pipeline.photo.target import check_target, read_strokes, read_target
 
 OWN = PHOTO.replace("assets/stream/image.jpg", "a.png").replace("assets/stream/mask.png", "m.png").replace(
     "[[[745, 340], [742, 376]], [[560, 600], [500, 640]]]", "[[[20, 10], [20, 50]]]")
@@ -58,6 +59,11 @@ def test_a_speed_map_says_the_speed_and_a_frozen_part_stands(tmp_path: Path) -> 
     assert target.fluid[24, 16] == 0 and target.fluid[4, 16] == 1
 
 
+def test_a_stroke_may_have_a_speed(tmp_path: Path) -> None:
+    target = read_target(scene(own(tmp_path), changed(OWN, "width = 96", "width = 96\nspeeds = [2.5]")))
+    np.testing.assert_allclose(target.wanted.speed, 2.5, atol=1e-5)
+
+
 @pytest.mark.parametrize(("picture", "matte", "told"), [
     (None, np.zeros(SHAPE), r"m\.png: photo\.matte: is empty"),
     (None, np.ones((60, 100)), r"m\.png: photo\.matte: has 100 x 60 pixels, and the picture 120 x 60"),
@@ -92,3 +98,30 @@ def test_nothing_is_written_before_the_target_is_known_to_be_good(tmp_path: Path
     assert cli.run(["figure", "tiny.toml"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def with_speed(folder: Path, shape: tuple[int, int]) -> Any:
+    """A scene with a speed map of `shape` (h, w) that is white above and black below."""
+    speed = np.zeros(shape, np.float32)
+    speed[:shape[0] // 2] = 1
+    pictures.write(folder / "s.png", speed)
+    return scene(own(folder), changed(OWN, "width = 96", 'width = 96\nfastest = 3.0\nspeed = "s.png"'))
+
+
+@pytest.mark.parametrize("shape", [(60, 120), (48, 96), (120, 240), (25, 50), (33, 65)])
+def test_a_speed_map_of_any_size_with_the_pictures_proportions_is_taken(tmp_path: Path, shape: tuple[int, int]) -> None:
+    speed = read_target(with_speed(tmp_path, shape)).wanted.speed
+    assert speed.shape == (48, 96) and speed.dtype == np.float32
+    np.testing.assert_allclose(speed[28:], 3, atol=0.02)
+    np.testing.assert_allclose(speed[:20], 0, atol=0.02)
+
+
+def test_a_speed_map_of_other_proportions_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"s\.png: photo\.speed: has 100 x 60 pixels: other proportions than the "
+                                       "picture, whose output has 96 x 48"):
+        check_target(with_speed(tmp_path, (60, 100)))
+
+
+def test_strokes_are_read_in_pixels_of_the_output_from_below(tmp_path: Path) -> None:
+    (stroke,) = read_strokes(scene(own(tmp_path), OWN))
+    np.testing.assert_allclose(stroke, [[15.9, 39.1], [15.9, 7.1]])

@@ -26,7 +26,7 @@ def target():
 def shown(of, velocity):
     count = len(of.corner)
     return Shown(np.zeros(count, int), np.zeros(count, int), np.zeros((count, 2), int),
-                 np.broadcast_to(np.float32(velocity), (count, CELLS, CELLS, 2)))
+                 np.broadcast_to(np.float32(velocity), (count, CELLS, CELLS, 2)), np.zeros(count, int))
 
 
 def differences(strength=12.0):
@@ -101,3 +101,15 @@ def test_a_matte_moves_with_the_fluid_it_cuts_out():
 def test_looks_that_make_no_sense(wrong):
     with pytest.raises(ValueError, match="carried share"):
         Look(**wrong)
+
+
+def test_of_a_soft_matte_the_fluids_own_colours_are_taken():
+    """A picture that is the fluid over a background is again that, when nothing moves."""
+    x = np.mgrid[:SHAPE[0], :SHAPE[1]][1]
+    alpha = np.clip((x - 10) / (SHAPE[1] - 20), 0, 1).astype(np.float32)
+    fluid, behind = np.float32([0.9, 0.5, 0.1]), np.float32([0.1, 0.2, 0.3])
+    picture = (alpha[..., None] * fluid + (1 - alpha[..., None]) * behind).astype(np.float32)
+    target = Target(picture, alpha, np.broadcast_to(behind, picture.shape).copy())
+    np.testing.assert_allclose(target.foreground, np.broadcast_to(fluid, picture.shape), atol=1e-5)
+    np.testing.assert_allclose(over_background(target, target.foreground, alpha), picture, atol=1e-5)
+    np.testing.assert_array_equal(Target(picture, np.ones_like(alpha)).foreground, picture)

@@ -18,10 +18,10 @@ def grain(seed=1, sigma=1.5, shape=SHAPE):
 def test_the_shores_colours_are_left_out():
     picture = np.full((*SHAPE, 3), 0.3, np.float32)
     picture[:, 60:] = [0.0, 1.0, 0.0]
-    matte = np.ones(SHAPE, np.float32)
-    matte[:, 58:] = 0
-    assert (extended(picture, matte) == np.float32(0.3)).all()
-    np.testing.assert_array_equal(extended(picture, np.ones(SHAPE)), picture)
+    fluid = np.ones(SHAPE, bool)
+    fluid[:, 58:] = False
+    assert (extended(picture, fluid) == np.float32(0.3)).all()
+    np.testing.assert_array_equal(extended(picture, np.ones(SHAPE, bool)), picture)
 
 
 def test_the_average_is_blurred_along_the_motion_and_not_across():
@@ -83,10 +83,12 @@ def test_a_small_change_of_a_middle_grey_is_what_was_asked_for():
     assert added(ground, np.full((1, 1), 0.02))[0, 0, 0] == pytest.approx(0.52, abs=1e-3)
 
 
-def test_a_darker_colour_keeps_its_hue():
-    ground = np.float32([[[0.2, 0.4, 0.6]]])
-    darker = added(ground, np.full((1, 1), -0.1))[0, 0]
-    np.testing.assert_allclose(darker / darker[2], ground[0, 0] / 0.6, atol=1e-4)
+def test_a_darker_colour_is_deeper_and_a_brighter_one_whiter():
+    ground = np.float32([[[0.8, 0.4, 0.2]]])
+    darker, brighter = (added(ground, np.full((1, 1), more))[0, 0] for more in (-0.1, 0.1))
+    assert darker.mean() < ground.mean() < brighter.mean()
+    assert darker[2] / darker[0] < 0.25 < brighter[2] / brighter[0]
+    assert (np.diff(darker) < 0).all() and (np.diff(brighter) < 0).all()
 
 
 def test_a_matched_frame_has_the_targets_values_and_no_lattice():
@@ -97,6 +99,13 @@ def test_a_matched_frame_has_the_targets_values_and_no_lattice():
     step = np.abs(np.diff(found, axis=1))
     lines = step[:, 15::16].mean() / np.delete(step, np.s_[15::16], axis=1).mean()
     assert lines == pytest.approx(1, abs=0.1)
+
+
+def test_regions_side_by_side_show_a_lattice():
+    ramp = np.linspace(-0.2, 0.2, SHAPE[1], dtype=np.float32)
+    found = matched(0.5 + ramp + 0.02 * grain(2), 0.4 + 0.1 * grain(3), np.ones(SHAPE, np.float32), 32, False)
+    step = np.abs(np.diff(found, axis=1))
+    assert step[:, 31::32].mean() / np.delete(step, np.s_[31::32], axis=1).mean() > 1.2
 
 
 def test_what_lies_outside_the_matte_is_not_matched():

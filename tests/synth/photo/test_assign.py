@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from synth.photo.assign import AGAIN, Database, Settings, Wanted, _between, _limited, assign, nodes
+from synth.photo.assign import AGAIN, Database, Settings, Wanted, _between, _limited, _printed, assign, nodes
 from synth.photo.index import exposures, index
 from synth.photo.pieces import VERSIONS, Cut
 from synth.photo.words import codebook, descriptors
@@ -118,6 +118,23 @@ def test_neighbours_that_continue_cost_nothing_and_the_same_piece_again_costs_mo
     assert found[0, 1] == pytest.approx(0, abs=2e-2)
     assert found[1, 0] > 0.05
     assert found[0, 0] >= AGAIN
+
+
+def test_as_printed_the_least_similar_candidate_is_preferred_and_powers_are_compared(database):
+    """Eq. 5 adds a similarity to what is minimized; the power of the mean (Eq. 2) knows no direction."""
+    printed = replace(FEW, energy="printed", weight=0.0)
+    target = exposures(CLIPS[0][0])[0]
+    (_, mended), (_, found) = (assign(target, full(), database, CUT, Wanted(), of)
+                               for of in (replace(FEW, weight=0.0, texture=0.0, brightness=0.0), printed))
+    assert 1 - mended.energies[1] / len(mended.piece) > found.energies[1] / len(found.piece)
+    pieces = database.pieces
+    rows = [next(n for n in np.flatnonzero(database.clip == 1) if VERSIONS[pieces.version[n]] == (1.0, 0.0, flipped)
+                 and (pieces.corner[n] == [16, 16]).all()) for flipped in (False, True)]
+    of = nodes(full((32, 48)), CUT)
+    edge, labels = int(np.flatnonzero(of.across)[0]), np.tile(rows, (len(of.corner), 1))
+    only_mean = replace(printed, sigma=0.0, rho=0.0)
+    assert _between(of, labels, database, replace(FEW, sigma=0.0, rho=0.0))[edge][0, 1] > 0.5
+    assert _printed(of, labels, database, only_mean)[edge][0, 1] == pytest.approx(0, abs=1e-2)
 
 
 def test_of_one_clip_come_no_more_than_its_share_unless_there_are_no_others():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from synth.photo import checks
+from synth.photo import checks, clips
 from synth.photo.clip import Clip, eight_bit
 from synth.photo.tiles import noise, rng
 
@@ -77,3 +77,13 @@ def test_a_camera_that_pans_is_told_from_a_fluid():
     assert checks.camera(pan) == pytest.approx(2, abs=0.1)
     assert checks.camera(falling) < checks.SHAKEN
     assert checks.camera(boiling) < checks.SHAKEN
+
+
+def test_a_cut_is_told_from_water_and_from_a_frame_that_was_lost():
+    """Between a river and a cloud, of which the river changes the more from frame to frame."""
+    river, cloud = (clips.clip(family, 5, 24, (96, 64)).luma for family in ("river", "cloud"))
+    for whole in (river, cloud, np.delete(river, 9, axis=0)):
+        assert checks.cut(whole) == 0
+    for at in (4, 12, 20):
+        assert checks.cut(np.concatenate([river[:at], cloud[at:]])) == at
+        assert checks.cut(np.concatenate([cloud[:at], river[at:]])) == at

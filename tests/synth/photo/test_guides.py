@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from synth.photo.guides import orientation, stroke_points
+from synth.photo.guides import orientation, speeds, stroke_points
 
 SHAPE = (60, 80)
 
@@ -61,6 +61,29 @@ def test_what_stands_still_parts_the_strokes():
     np.testing.assert_allclose(parted[:, :38], np.broadcast_to([1, 0], (60, 38, 2)), atol=1e-4)
     np.testing.assert_allclose(parted[:, 42:], np.broadcast_to([0, 1], (60, 38, 2)), atol=1e-4)
     assert np.abs(free[30, 36] - [1, 0]).max() > 0.1
+
+
+def test_speeds_lie_between_those_of_the_strokes_and_are_theirs_on_them():
+    strokes = [np.array([[10.0, 5.0], [10.0, 55.0]]), np.array([[70.0, 5.0], [70.0, 55.0]])]
+    found = speeds(strokes, [1.0, 4.0], SHAPE)
+    assert found.min() >= 1 and found.max() <= 4
+    np.testing.assert_allclose(found[10:50, 10], 1, atol=0.1)
+    np.testing.assert_allclose(found[10:50, 70], 4, atol=0.1)
+    assert (np.diff(found[30]) >= -1e-3).all()
+
+
+def test_a_speed_is_not_heard_behind_what_stands_still():
+    frozen = np.zeros(SHAPE, bool)
+    frozen[:, 38:42] = True
+    found = speeds([np.array([[20.0, 5.0], [20.0, 55.0]]), np.array([[60.0, 5.0], [60.0, 55.0]])], [1, 4], SHAPE,
+                   frozen)
+    np.testing.assert_allclose(found[:, :38], 1, atol=1e-3)
+    np.testing.assert_allclose(found[:, 42:], 4, atol=1e-3)
+
+
+def test_each_stroke_has_one_speed():
+    with pytest.raises(ValueError, match="1 strokes need 1 speeds, not 2"):
+        speeds([np.array([[10.0, 5.0], [10.0, 55.0]])], [1.0, 2.0], SHAPE)
 
 
 def test_strokes_that_cancel_leave_no_hole():

@@ -22,7 +22,7 @@ from synth.photo.index import (
     index,
 )
 from synth.photo.pieces import VERSIONS, Cut
-from synth.photo.words import codebook, common, descriptors
+from synth.photo.words import TOTAL, codebook, common, descriptors
 
 FRAMES, SHAPE, CUT = 12, (72, 96), Cut(32)
 SPEED = (1.0, -2.0)
@@ -115,7 +115,7 @@ def test_a_part_of_the_clip_itself_is_found(found):
     assert VERSIONS[of.version[n]] == (1.0, 0.0, False)
     assert (of.corner[n] == [16, 48]).all()
     assert exposure == 2
-    assert shared.max() == 1
+    assert shared.max() == TOTAL
 
 
 def test_a_clip_that_stands_still_has_no_pieces(found):

@@ -15,22 +15,23 @@ STRAIGHT = VERSIONS.index((1.0, 0.0, False))
 def shown(corners, clips, velocity=(0.0, 0.0)):
     count = len(corners)
     return Shown(np.array(clips), np.full(count, STRAIGHT), np.array(corners),
-                 np.broadcast_to(np.float32(velocity), (count, CELLS, CELLS, 2)))
+                 np.broadcast_to(np.float32(velocity), (count, CELLS, CELLS, 2)), np.zeros(count, int))
 
 
 def noise(seed, frames=12, shape=(80, 112)):
     return np.random.Generator(np.random.Philox(seed)).integers(0, 256, (frames, *shape)).astype(np.uint8)
 
 
-def test_squares_of_weights_add_up_to_one_where_the_matte_is():
+@pytest.mark.parametrize(("blending", "power"), [("roots", 2), ("shares", 1)])
+def test_weights_add_up_to_one_where_the_matte_is(blending, power):
     matte = np.ones(SHAPE)
     matte[:, 70:] = 0
     of = nodes(matte, CUT)
     total = np.zeros((BANDS, *SHAPE))
     for p, (y, x) in enumerate(of.corner):
         low, left = max(y, 0), max(x, 0)
-        part = weights(of, SHAPE, CUT)[p][:, low - y:SHAPE[0] - y, left - x:SHAPE[1] - x]
-        total[:, low:low + part.shape[1], left:left + part.shape[2]] += part**2
+        part = weights(of, SHAPE, CUT, blending)[p][:, low - y:SHAPE[0] - y, left - x:SHAPE[1] - x]
+        total[:, low:low + part.shape[1], left:left + part.shape[2]] += part**power
     np.testing.assert_allclose(total[:, :, :70], 1, atol=1e-5)
 
 
@@ -49,17 +50,20 @@ def test_bands_add_up():
     assert found[0].std() > found[1].std() > found[2].std()
 
 
-def test_the_deviation_is_the_same_between_pieces_and_at_their_middles():
+@pytest.mark.parametrize(("blending", "kept"), [("roots", 1.0), ("shares", 0.6)])
+def test_the_deviation_between_pieces_and_at_their_middles(blending, kept):
+    """The same, and less with weights that add up to one."""
     of = nodes(np.ones(SHAPE), CUT)
     count = len(of.corner)
     random = np.random.Generator(np.random.Philox(7))
     corners = [(int(y), int(x)) for y, x in random.integers(0, [48, 80], (count, 2))]
     clips = {k: noise(k, 24) for k in range(count)}
-    found = differences(of, shown(corners, range(count)), clips.__getitem__, SHAPE, CUT, 24, 1)
+    found = differences(of, shown(corners, range(count)), clips.__getitem__, SHAPE, CUT, 24, 1, blending)
     deviation = found.bands.sum(axis=0).std(axis=0)
     y, x = (np.mgrid[:64, :96] % 16)
-    middle, between = (np.abs(y - 8) < 2) & (np.abs(x - 8) < 2), (y < 1) | (x < 1)
-    assert deviation[between].mean() / deviation[middle].mean() == pytest.approx(1, abs=0.1)
+    # pieces begin at multiples of 16, and their middles lie there too
+    between, middle = (np.abs(y - 8) < 2) & (np.abs(x - 8) < 2), (y < 1) & (x < 1)
+    assert deviation[between].mean() / deviation[middle].mean() == pytest.approx(kept, abs=0.1)
     np.testing.assert_allclose(found.bands.sum(axis=0).mean(axis=0), 0, atol=1e-2)
 
 

@@ -14,6 +14,7 @@ from synth.photo.motion import (
     motion,
     octaves,
     optical_flow,
+    spectrum,
     textureness,
 )
 
@@ -104,3 +105,23 @@ def test_textureness_knows_strength_and_scale():
     half = textureness(np.stack([np.uint8(128 + (grain(sigma=0.7) - 128.0) / 2)] * 2))
     np.testing.assert_allclose(half.mean() / fine.mean(), 0.5, atol=0.02)
     assert not textureness(np.full((2, *SHAPE), 99, np.uint8)).any()
+
+
+@pytest.mark.parametrize("frames", [32, 33])
+def test_a_spectrum_tells_the_amplitude_and_frequency_of_a_motion(frames):
+    """A swing of 3 pixels along x, 5 times in the clip, over a drift of 2 along y."""
+    flow = np.zeros((frames, 16, 16, 2), np.float32)
+    flow[..., 0] += 3 * np.cos(2 * np.pi * 5 * np.arange(frames) / frames)[:, None, None]
+    flow[..., 1] = 2
+    found = spectrum(flow)
+    assert found.shape == (frames // 2 + 1,)
+    np.testing.assert_allclose(found[[0, 5]], [2, 3 / np.sqrt(2)], atol=1e-5)
+    assert np.delete(found, [0, 5]).max() < 1e-5
+    assert spectrum(flow, np.full((16, 16, 2), 4, np.float32))[0] == pytest.approx(4 * np.sqrt(2))
+
+
+@pytest.mark.parametrize("frames", [16, 17])
+def test_a_spectrum_has_all_the_power_of_a_motion(frames):
+    flow = np.random.Generator(np.random.Philox(3)).normal(size=(frames, CELL, CELL, 2))
+    flow[:] = flow.mean(axis=(1, 2), keepdims=True)
+    assert (spectrum(flow) ** 2).sum() == pytest.approx((flow**2).sum(axis=3).mean(), rel=1e-6)

@@ -11,6 +11,7 @@ from synth.photo.pieces import (
     canvas,
     inside,
     pixels,
+    scaled,
     shrunk,
     to_clip,
     turned_vectors,
@@ -73,7 +74,8 @@ def clip(frames=4):
 
 def test_a_straight_piece_is_a_part_of_the_clip():
     frames = clip()
-    np.testing.assert_array_equal(pixels(frames, (24, 48), CUT, Version(1, 0, False)), frames[:, 24:72, 48:96])
+    found = pixels(frames, frames.shape[1:], (24, 48), CUT, Version(1, 0, False))
+    np.testing.assert_array_equal(found, frames[:, 24:72, 48:96])
 
 
 @pytest.mark.parametrize("version", [v for v in VERSIONS if v.scale == 1])
@@ -84,12 +86,13 @@ def test_a_piece_shows_what_its_map_says(version):
     points = at @ np.stack([x.ravel() + corner[1], y.ravel() + corner[0], np.ones(48 * 48)])
     expected = ndimage.map_coordinates(frames[2].astype(float), points[::-1], order=1).reshape(48, 48)
     # OpenCV places points to 1/32 of a pixel
-    assert np.abs(pixels(frames, corner, CUT, version)[2] - expected).max() < 1.2
+    found = pixels(scaled(frames, version.scale), frames.shape[1:], corner, CUT, version)
+    assert np.abs(found[2] - expected).max() < 1.2
 
 
 def test_a_smaller_piece_shows_more():
     frames = clip()
-    half = pixels(frames, (6, 6), CUT, Version(0.5, 0, False))
+    half = pixels(scaled(frames, 0.5), frames.shape[1:], (6, 6), CUT, Version(0.5, 0, False))
     assert half.shape == (4, 48, 48)
     np.testing.assert_allclose(half[0], frames[0, 12:108, 12:108].reshape(48, 2, 48, 2).mean(axis=(1, 3)), atol=1)
 
