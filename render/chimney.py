@@ -18,11 +18,11 @@ from synth.noise import gradient_noise
 
 CAMERA = studio.Camera(position=(0.0, -0.12, 4.6), target=(0.16, 0.27, 0.0), fov=13.6)
 EXTINCTION = 70.0  # per world unit at density 1
-ALBEDO = (0.985, 0.985, 0.987)
+ALBEDO = (0.966, 0.966, 0.970)
 FORWARD = 0.2
 SUN = (-0.90, 0.30, 0.10)  # towards it: low, from the left
-SUNLIGHT = (4.6, 3.4, 2.2)  # irradiance on a surface that faces it
-ZENITH, HORIZON, GLOW = (0.085, 0.16, 0.33), (0.36, 0.34, 0.36), (0.40, 0.22, 0.10)
+SUNLIGHT = (4.6, 3.5, 2.3)  # irradiance on a surface that faces it
+ZENITH, HORIZON, GLOW = (0.06, 0.115, 0.25), (0.29, 0.27, 0.29), (0.34, 0.18, 0.08)
 SOFTNESS = 12.0  # concentration of the sun's glow
 DISTANT = 40.0  # of the lamp that stands for the sun in the march
 WINDOW = 2.6  # of the denoiser, pixels
@@ -88,7 +88,7 @@ def _traced(density: np.ndarray, voxel: float, origin: tuple[float, float, float
     scene = _environment(mi) | {
         "smoke": smoke.medium(mi, density, voxel, origin, EXTINCTION, ALBEDO),
         "sensor": mitsuba_shapes.sensor(mi, camera, shot.width, shot.height, "independent")}
-    integrator = mi.load_dict({"type": "volpath", "max_depth": 40, "rr_depth": 40, "hide_emitters": True})
+    integrator = mi.load_dict({"type": "volpath", "max_depth": 28, "rr_depth": 28, "hide_emitters": True})
     return mitsuba_shapes.rendered(mi, scene, integrator, shot)
 
 
@@ -169,7 +169,7 @@ def _hills() -> tuple[studio.Mesh, np.ndarray]:
     faces = []
     for z, height, pale in ((-26.0, 0.55, 0.75), (-16.0, -0.05, 0.5), (-9.0, -0.35, 0.2)):
         top = height + 0.55 * gradient_noise([x / 5 + z], 51) + sum(
-            0.05 * 0.55**k * np.abs(gradient_noise([x * 3 * 2**k + z], 52 + k)) for k in range(4))
+            0.035 * 0.6**k * (gradient_noise([x * 4 * 2**k + z], 52 + k)) for k in range(4))
         row = np.stack([np.stack([x, np.full_like(x, -6), np.full_like(x, z)], -1),
                         np.stack([x, top, np.full_like(x, z)], -1)])
         meshes.append(row.reshape(-1, 3))

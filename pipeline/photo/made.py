@@ -17,7 +17,7 @@ from pipeline.photo.tables import PhotoScene, Stroke
 
 SHAPE = (480, 640)
 """Rows and columns in which strokes and masks of a made picture are given; it is rendered at the scene's width."""
-SPP = {"fire": 48, "smoke": 48}
+SPP = {"fire": 48, "smoke": 24}
 """Paths per pixel."""
 STROKES: dict[str, tuple[Stroke, ...]] = {
     "fire": (((318.0, 410.0), (318.0, 250.0), (325.0, 40.0)), ((270.0, 370.0), (290.0, 240.0), (310.0, 80.0)),

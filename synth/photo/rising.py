@@ -8,6 +8,7 @@ place and time what left there then. `flames` and `plume` read them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import fft, ndimage
@@ -62,7 +63,7 @@ def simulated(cells: tuple[int, int, int], rows: int) -> tuple[int, int, int]:
 
 
 def rising(shape: tuple[int, int, int], seed: int, *, frames: int, ground: float, draught: float = 0.0,
-           averaged: int = 24, **plume: float) -> Rising:
+           averaged: int = 24, **plume: Any) -> Rising:
     """What has risen after `frames` frames.
 
     shape     (Z, Y, X) cells
