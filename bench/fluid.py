@@ -113,12 +113,17 @@ def lattice(frames: np.ndarray, matte: np.ndarray, stride: int) -> Lattice:
 def edges(frames: np.ndarray, target: np.ndarray, frozen: np.ndarray) -> float:
     """The correlation of the gradients of the mean frame and of the target where the picture should stand still: -1..1.
 
-    frozen  (Y, X) bool: the freeze mask
+    frozen  (Y, X) bool: the freeze mask. Gradients are differences of neighbours that both lie in it
     """
-    ours, theirs = (np.stack(np.gradient(picture.astype(np.float64)), axis=-1)[frozen]
-                    for picture in (frames.mean(axis=0, dtype=np.float64), target))
-    power = float((ours * ours).sum() * (theirs * theirs).sum())
-    return float((ours * theirs).sum() / np.sqrt(power)) if power > 0 else float("nan")
+    ours, theirs = [], []
+    for axis in (0, 1):
+        inside = np.take(frozen, range(1, frozen.shape[axis]), axis) & np.take(frozen, range(frozen.shape[axis] - 1),
+                                                                               axis)
+        ours.append(np.diff(frames.mean(axis=0, dtype=np.float64), axis=axis)[inside])
+        theirs.append(np.diff(target.astype(np.float64), axis=axis)[inside])
+    mine, its = np.concatenate(ours), np.concatenate(theirs)
+    power = float((mine * mine).sum() * (its * its).sum())
+    return float((mine * its).sum() / np.sqrt(power)) if power > 0 else float("nan")
 
 
 def loop(frames: np.ndarray, matte: np.ndarray) -> float:

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -217,13 +218,19 @@ def pictures_of(scale: Scale) -> dict[str, Any]:
         for variant in VARIANTS if name in COMPARED else (OURS,):
             found = animated(subject.guided, of_clips, VARIANTS[variant])
             looks.append(look(name, variant, subject, found.frames) | {
-                "nodes": len(found.of.corner), "nodes widened": int((found.assigned.angle > ANGLES[0]).sum())})
+                "edges, no mask": None, "nodes": len(found.of.corner),
+                "nodes widened": int((found.assigned.angle > ANGLES[0]).sum())})
+            if subject.target.frozen is not None and variant == OURS:
+                unmasked = animated(replace(subject.guided, frozen=None), of_clips, VARIANTS[OURS])
+                looks[-1]["edges, no mask"] = rounded(fluid.edges(
+                    unmasked.frames, subject.target.picture.mean(axis=2), subject.target.frozen))
             if subject.truth is not None and variant == OURS:
                 alone = animated(subject.target, of_clips, VARIANTS[OURS])
                 truths += [truth(name, strokes, subject, frames) for strokes, frames in (
                     ("without", alone.frames), ("with", found.frames))]
         if subject.truth is not None:
-            looks.append(look(name, ITSELF, subject, subject.frames) | {"nodes": None, "nodes widened": None})
+            looks.append(look(name, ITSELF, subject, subject.frames) | {
+                "edges, no mask": None, "nodes": None, "nodes widened": None})
         if name in MINIMIZED:
             energies.append(minimized(name, subject, of_clips))
     return {"pieces": len(of_clips.database.clip), "look": looks, "truth": truths, "minimizers": energies}

@@ -30,7 +30,7 @@ CLIPS: dict[str, tuple[str, dict[str, Any]]] = {
     "white water, rising": ("white-water", {"direction": 1.9, "stones": 3}),
     "river, to the left": ("river", {"direction": 2.6, "stones": 8})}
 """Each a family and its variation."""
-PHOTOGRAPH = Path(__file__).parents[1] / "scenes/okabe11-stream.toml"
+PHOTOGRAPH = Path(__file__).parents[1] / "scenes/okabe11-fig01.toml"
 COVERED = 0.05
 """Share of the time in which fluid is seen at a place that does not stand still."""
 SHORE = 1.5
@@ -74,7 +74,7 @@ class Subject:
 
 
 def photograph(width: int) -> Subject:
-    """The stream of scenes/okabe11-stream.toml, `width` pixels wide."""
+    """The stream of scenes/okabe11-fig01.toml, `width` pixels wide."""
     scene = load(PHOTOGRAPH).variants[""]
     guided = read_target(scene.model_copy(update={"photo": scene.photo.model_copy(update={"width": width})}))
     return Subject(replace(guided, wanted=Wanted()), guided.wanted.orientation)

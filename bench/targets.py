@@ -291,6 +291,7 @@ TELLING = ("fall", "fall over ledges", "fire", "smoke")
 
 def photo(found: dict[str, Any]) -> Iterable[Row]:
     yield from _photo_look(found["look"])
+    yield from _photo_masks(found["look"])
     yield from _photo_ways(found["look"])
     for strokes, limit in (("without", 20), ("with", 15)):
         rows = [row for row in found["truth"]
@@ -326,6 +327,15 @@ def _photo_look(rows: list[dict[str, Any]]) -> Iterable[Row]:
         values = [row[key] for row in theirs for key in keys if row[key] is not None]
         yield _worst(f"okabe11: {what}", ours, "target", keys, low, high, unit, shown.format,
                      f"clips themselves: {shown.format(min(values))} to {shown.format(max(values))}{unit}")
+
+
+def _photo_masks(rows: list[dict[str, Any]]) -> Iterable[Row]:
+    """What stands still in pictures whose freeze mask the user did not draw."""
+    unmasked = [row for row in rows if row["edges, no mask"] is not None]
+    least = min(unmasked, key=lambda row: row["edges, no mask"])
+    yield without_target("okabe11: the same correlation where no freeze mask is given",
+                         f"worst {least['edges, no mask']:.2f} ({least['target']}), mean of {len(unmasked)} targets "
+                         f"{_average(unmasked, 'edges, no mask'):.2f}")
 
 
 def _photo_ways(rows: list[dict[str, Any]]) -> Iterable[Row]:

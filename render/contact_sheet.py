@@ -45,11 +45,13 @@ def thumbnails(frames: Sequence[np.ndarray], width: int, aspect: float) -> np.nd
 
     frames  each (Y, X) uint8 grey, row 0 the lowest
     aspect  width over height of the sheet that is aimed at
-    They are as large as fits in columns and rows, by rows from the upper left; the first says their proportions.
+    By rows from the upper left; the first says their proportions. Of the two numbers of columns next to the aim the one
+    that leaves fewer places empty is taken.
     """
     rows, columns = frames[0].shape
-    best = math.sqrt(len(frames) * aspect * rows / columns)
-    beside = min(max(1, round(best)), len(frames))
+    aim = math.sqrt(len(frames) * aspect * rows / columns)
+    near = [min(max(1, count), len(frames)) for count in (math.ceil(aim), math.floor(aim))]
+    beside = min(near, key=lambda count: -len(frames) % count)
     edges = np.rint(np.linspace(0, width + GAP, beside + 1)).astype(int)
     height = max(1, round(((width + GAP) / beside - GAP) * rows / columns))
     page = np.ones((-(-len(frames) // beside) * (height + GAP) - GAP, width, 3), np.float32)

@@ -29,6 +29,8 @@ REGION = 64
 """Pixels of a region in which histograms are matched."""
 THIN = 0.2
 """The least matte by which the fluid can be told from what is behind it."""
+SHORE = 2.0
+"""Pixels at the edge of a matte that are seldom the fluid alone."""
 TOWARDS = 0.9
 """Share of the wanted direction in the motion that the photograph is carried by; the rest is that of the pieces."""
 
@@ -95,8 +97,12 @@ class Target:
     @property
     def shows(self) -> np.ndarray:
         """Where the picture shows enough of the fluid to read it: (Y, X) bool. With a background it is known what else
-        a soft matte shows."""
-        return np.asarray(self.fluid > (0.5 if self.background is None else THIN))
+        a soft matte shows; without, pixels at the shore are left out, which show some of it, but for narrow parts."""
+        if self.background is not None:
+            return np.asarray(self.fluid > THIN)
+        sure = self.fluid > 0.5
+        inner = photograph.inland(sure) > SHORE
+        return np.asarray(inner | (sure & (photograph.inland(~inner) > 2 * SHORE)))
 
     @property
     def foreground(self) -> np.ndarray:

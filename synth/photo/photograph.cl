@@ -23,7 +23,7 @@ inline float4 between(__global const float4 *detail, int width, int height, floa
 }
 
 // One frame (height, width, 4). where (ages, height, width, 2): where a pixel was, each frame before. pixels (height,
-// width, 4): the part of its life that the first copy has lived at frame 0; the pixel's life, a number between those of
+// width, 4): how many of its lives the first copy has lived at frame 0; the pixel's life, a number between those of
 // lives (LIVES frames each, falling); how far copies begin from it; 0. starts (LIVES, 2, STARTS, 2): where to, for each
 // life of a copy in turn. own: pixels over which detail is like itself.
 __kernel void carried(__global const float4 *detail, __global const float2 *where, __global const float4 *pixels,

@@ -34,6 +34,8 @@ HALVINGS = 2
 """The shortest life is the longest over 2 to this power."""
 SCATTER = 24.0
 """σ, pixels, of the noise by which lives begin at different times."""
+SPREAD = 1.0
+"""Deviation of the times at which lives begin, in lives: all ages are then about as frequent."""
 STEPS_A_PIXEL = 1.0
 """Steps of a path for each pixel of the fastest motion."""
 KEPT = 0.2
@@ -72,7 +74,8 @@ def split(picture: np.ndarray, motion: np.ndarray, feature: float, fluid: np.nda
     """What stands of a picture (Y, X, C) float32 that flows by motion (Y, X, 2), and what moves.
 
     feature  size of what moves, as streaks, ripples and billows, pixels
-    fluid    (Y, X) bool: where the fluid is. Nothing else is averaged with it; detail goes on beyond it, mirrored
+    fluid    (Y, X) bool: where the fluid is. Nothing else is averaged with it; detail goes on beyond it, mirrored, and
+             fades over a feature
     """
     free = fluid.astype(np.float32)
     ground = standing(picture, motion, feature, free)
@@ -81,7 +84,15 @@ def split(picture: np.ndarray, motion: np.ndarray, feature: float, fluid: np.nda
     strength = np.sqrt(np.maximum(_smooth(squares[..., None], STRENGTH * feature, free)[..., 0], 0)) + FAINT
     unit = np.clip(detail / strength[..., None], -MOST, MOST).astype(np.float32)
     beyond = mirrored(fluid)
-    return Split(ground, unit[beyond], strength[beyond])
+    fades = np.exp(-((inland(~fluid) / np.float32(feature)) ** 2))
+    return Split(ground, fades[..., None] * unit[beyond], strength[beyond])
+
+
+def inland(fluid: np.ndarray) -> np.ndarray:
+    """Pixels from each place of the fluid (Y, X) bool to its shore: (Y, X) float32, 0 outside; the picture's border is
+    none."""
+    return np.asarray(ndimage.distance_transform_edt(fluid), np.float32) if not fluid.all() else np.full(
+        fluid.shape, max(fluid.shape), np.float32)
 
 
 def mirrored(fluid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -178,13 +189,15 @@ def paths(motion: np.ndarray, life: int) -> np.ndarray:
 
 
 def turns(shape: tuple[int, int], seed: int) -> np.ndarray:
-    """The part of its life that the first copy of each pixel has lived at frame 0: (Y, X) float32 in [0, 1), smooth but
-    for the step from 1 to 0."""
+    """How many of its lives the first copy of each pixel has lived at frame 0: (Y, X) float32, smooth, from 0 on.
+
+    A whole number more is another life, which begins elsewhere: so it is a number, not an angle.
+    """
     random = np.random.Generator(np.random.Philox(key=[seed, 1]))
-    # a smooth angle, from two smooth numbers: each age is as frequent as any other
-    one, other = (ndimage.gaussian_filter(random.standard_normal(shape), SCATTER, mode="nearest") for _ in range(2))
-    turn = np.arctan2(one - one.mean(), other - other.mean()) / (2 * np.pi)
-    return (turn % 1).astype(np.float32) % np.float32(1)
+    # any other border would repeat single numbers of the noise
+    smooth = ndimage.gaussian_filter(random.standard_normal(shape), SCATTER, mode="wrap")
+    turn = SPREAD * (smooth - smooth.mean()) / max(float(smooth.std()), 1e-12)
+    return (turn - np.floor(turn.min())).astype(np.float32)
 
 
 def starts(lived: np.ndarray, length: int, seed: int) -> np.ndarray:
@@ -215,8 +228,8 @@ def frames(picture: np.ndarray, motion: np.ndarray, length: int, seed: int, feat
     lived = lives(length)
     speed = ndimage.gaussian_filter(np.hypot(motion[..., 0], motion[..., 1]), STRENGTH * feature, mode="nearest")
     place = places(speed, lived, feature)
-    # what stands begins where it is
-    far = AWAY * np.minimum(speed * np.interp(place, np.arange(len(lived)), lived), feature)
+    # what stands begins where it is, and nothing beyond the shore
+    far = np.minimum(AWAY * np.minimum(speed * np.interp(place, np.arange(len(lived)), lived), feature), inland(fluid))
     carry = Carrying(
         np.pad(of.detail, ((0, 0), (0, 0), (0, 1))), paths(motion, int(np.ceil(lived[0]))),
         np.stack([turns(motion.shape[:2], seed), place, far, np.zeros_like(far)], axis=-1).astype(np.float32),

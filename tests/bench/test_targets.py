@@ -15,7 +15,8 @@ LOOP = {"last to first": 0.99, "std, min": 0.97, "std, max": 1.01, "grad, min": 
         "hist, max": 0.05}
 SECONDS = {"first frame, wall s": 0.4, "first frame, processor s": 0.3, "wall ms": 20, "processor ms": 15}
 FLOWING = {"way": "ours", "nodes": 48, "low-pass": 3.1, "1 px": 0.92, "2 px": 1.01, "4 px": 0.97,
-           "angle to strokes": 9.0, "deviation": 1.04, "gradient": 0.97, "edges": None, "loop": 1.05}
+           "angle to strokes": 9.0, "deviation": 1.04, "gradient": 0.97, "edges": None,
+           "edges, no mask": None, "loop": 1.05}
 TRUE = {"angle": 12.0, "angle of the clip's own flow": 7.0, "spectrum": 0.2}
 ENERGIES = {"data term alone": 115.2, "α-expansion": 100.4, "ICM": 98.7, "TRW-S": 95.7}
 DISTANCES = {"pair correlation": 0.05, "motion spectrum": None, "nearest distance": 0.02}
@@ -65,7 +66,8 @@ FOUND: dict[str, dict[str, Any]] = {
                 "against the reference": {"size": "256²", "ours": TIMES, "reference": TIMES,
                                           "largest difference": 0.0}},
     "loops": {"period": 120, "loops": [{"texture": name, **LOOP} for name in TEXTURES]},
-    "photo": {"look": [{"target": "stream", **FLOWING}, {"target": "river", **FLOWING, "edges": 0.97},
+    "photo": {"look": [{"target": "stream", **FLOWING},
+                       {"target": "river", **FLOWING, "edges": 0.97, "edges, no mask": 0.8},
                        {"target": "river", **FLOWING, "way": "the clip itself", "edges": 0.99},
                        {"target": "stream", **FLOWING, "way": "differences alone", "low-pass": 9.0, "loop": None}],
               "truth": [{"target": "fall", "strokes": "without", **TRUE}, {"target": "fall", "strokes": "with", **TRUE},

@@ -1,6 +1,7 @@
 """A sheet of clips: each clip's frames where they belong, the right way up."""
 
 import numpy as np
+import pytest
 
 from render.contact_sheet import GAP, contact_sheet, panels, thumbnails
 
@@ -31,18 +32,25 @@ def test_a_sheet_has_a_place_for_every_clip():
 
 
 def test_thumbnails_have_a_place_each_by_rows_the_right_way_up():
-    frames = [np.full((30, 40), 20 + 30 * k, np.uint8) for k in range(7)]
+    frames = [np.full((30, 40), 20 + 30 * k, np.uint8) for k in range(8)]
     for frame in frames:
         frame[:10] = 255  # the lowest rows
     page = thumbnails(frames, 200, 1.5)
     assert page.shape[1] == 200
     wide = (200 + GAP) / 3
-    for k in range(7):
+    for k in range(8):
         row, column = divmod(k, 3)
         left, top = round(column * wide) + 20, row * (len(page) + GAP) // 3
         assert abs(page[top + 10, left, 0] * 255 - (20 + 30 * k)) < 1
         assert page[top + (len(page) + GAP) // 3 - GAP - 4, left, 0] > 0.99
-    np.testing.assert_array_equal(page[-20:, -100:], 1)
+    np.testing.assert_array_equal(page[-20:, -60:], 1)
+
+
+def test_a_sheet_of_thumbnails_has_few_empty_places():
+    """24 of 4 : 3 for 3 : 2: 6 columns of 4, not 5 of 5."""
+    page = thumbnails([np.zeros((30, 40), np.uint8)] * 24, 240, 1.5)
+    assert len(page) == pytest.approx(4 * 30, abs=4)
+    np.testing.assert_array_equal((page[:, :, 0] == 0).sum(axis=0).max(), (page[:, -20:, 0] == 0).sum(axis=0).max())
 
 
 def test_a_sheet_of_thumbnails_has_about_the_proportions_it_should():
