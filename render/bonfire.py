@@ -142,14 +142,6 @@ def surroundings(mi: Any, seed: int) -> dict[str, Any]:
 LOGS, STONES, TREES = 8, 17, 16
 
 
-def _grid(rows: int, columns: int) -> np.ndarray:
-    """Triangles of a grid of vertices, row by row."""
-    r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
-    here = (r * columns + c).ravel()
-    return np.concatenate([np.stack([here, here + columns, here + 1], 1),
-                           np.stack([here + 1, here + columns, here + columns + 1], 1)]).astype(np.uint32)
-
-
 def _fractal(points: np.ndarray, size: float, octaves: int, seed: int) -> np.ndarray:
     """Noise (N,) at points (N, D) of octaves that fall by half."""
     return np.sum([0.5**k * gradient_noise([*(points.T * (2**k / size))], seed + k) for k in range(octaves)], axis=0)
@@ -160,7 +152,7 @@ def _ground(seed: int) -> tuple[studio.Mesh, np.ndarray]:
     share = np.linspace(-1, 1, 420)
     x = 2.2 * np.sign(share) * np.abs(share) ** 1.6
     z = np.concatenate([-9 + 7.6 * np.linspace(0, 1, 60)[:-1], np.linspace(-1.4, 1.9, 460)])
-    zz, xx = np.meshgrid(z, x * 1.0, indexing="ij")
+    zz, xx = np.meshgrid(z, x, indexing="ij")
     xx = xx * np.where(zz < -1.4, 1 + 0.7 * (-1.4 - zz), 1)
     flat = np.stack([xx.ravel(), zz.ravel()], -1)
     lumps = _fractal(flat, 0.5, 3, seed + 11)
@@ -174,7 +166,8 @@ def _ground(seed: int) -> tuple[studio.Mesh, np.ndarray]:
     earth = earth * (1 - grass) + grass * tone * np.array([0.16, 0.18, 0.08])
     ash = np.clip(1.3 - off / 0.3, 0, 1)[:, None]
     colours = earth * (1 - ash) + ash * tone * np.array([0.16, 0.15, 0.145])
-    return studio.Mesh(np.stack([flat[:, 0], y, flat[:, 1]], -1).astype(np.float32), _grid(len(z), len(x))), colours
+    vertices = np.stack([flat[:, 0], y, flat[:, 1]], -1).astype(np.float32)
+    return studio.Mesh(vertices, studio.grid_faces(len(z), len(x))), colours
 
 
 def _log(number: int, random: np.random.Generator, seed: int) -> tuple[studio.Mesh, np.ndarray]:
@@ -218,7 +211,7 @@ def _trunk(foot: np.ndarray, head: np.ndarray, radius: float, rows: int, columns
         [*(points.T / (3 * radius))], seed + 9)
     reach = (wide[:, None] * furrow.reshape(len(share), columns))[..., None]
     vertices = round_ * radius * reach + centre[:, None]
-    return (studio.Mesh(vertices.reshape(-1, 3).astype(np.float32), _grid(len(share), columns)),
+    return (studio.Mesh(vertices.reshape(-1, 3).astype(np.float32), studio.grid_faces(len(share), columns)),
             np.repeat(face, columns))
 
 
@@ -233,7 +226,8 @@ def _stone(number: int, random: np.random.Generator, seed: int) -> tuple[studio.
     flat = np.array([random.uniform(0.9, 1.2), random.uniform(0.6, 0.85), random.uniform(0.8, 1.1)])
     grey = random.uniform(0.25, 0.45) * (1 + 0.5 * _fractal(unit, 0.25, 4, seed + 500 + number))
     colours = np.clip(grey, 0.02, 1)[:, None] * np.array([1.0, 0.95, 0.88])
-    return studio.Mesh((middle + size * flat * unit * shape[:, None]).astype(np.float32), _grid(48, 64)), colours
+    vertices = (middle + size * flat * unit * shape[:, None]).astype(np.float32)
+    return studio.Mesh(vertices, studio.grid_faces(48, 64)), colours
 
 
 def _tree(random: np.random.Generator, seed: int) -> tuple[studio.Mesh, np.ndarray]:

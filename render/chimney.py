@@ -158,7 +158,7 @@ def _works() -> tuple[studio.Mesh, np.ndarray]:
     y = np.where(rows[:, None] < -0.9, -0.9, ridge[None] + 0.12 * rows[:, None])
     z = np.broadcast_to(np.where(rows < -0.9, 0.3, 0.3)[:, None], y.shape)
     xx = np.broadcast_to(x, y.shape)
-    mesh = studio.Mesh(np.stack([xx, y, z], -1).reshape(-1, 3).astype(np.float32), _grid(*y.shape))
+    mesh = studio.Mesh(np.stack([xx, y, z], -1).reshape(-1, 3).astype(np.float32), studio.grid_faces(*y.shape))
     return mesh, _bricks(mesh.vertices[:, 0] / 0.028, mesh.vertices[:, 1] / 0.0095, 41) * 0.7
 
 
@@ -173,17 +173,9 @@ def _hills() -> tuple[studio.Mesh, np.ndarray]:
         row = np.stack([np.stack([x, np.full_like(x, -6), np.full_like(x, z)], -1),
                         np.stack([x, top, np.full_like(x, z)], -1)])
         meshes.append(row.reshape(-1, 3))
-        faces.append(_grid(2, len(x)) + count)
+        faces.append(studio.grid_faces(2, len(x)) + count)
         count += 2 * len(x)
         tone = np.array([0.06, 0.075, 0.05]) * (1 - pale) + pale * np.array([0.42, 0.43, 0.47])
         colours.append(np.broadcast_to(tone, (2 * len(x), 3)))
     mesh = studio.Mesh(np.concatenate(meshes).astype(np.float32), np.concatenate(faces).astype(np.uint32))
     return mesh, np.concatenate(colours)
-
-
-def _grid(rows: int, columns: int) -> np.ndarray:
-    """Triangles of a grid of vertices, row by row."""
-    r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
-    here = (r * columns + c).ravel()
-    return np.concatenate([np.stack([here, here + 1, here + columns], 1),
-                           np.stack([here + 1, here + columns + 1, here + columns], 1)]).astype(np.uint32)
