@@ -11,6 +11,10 @@ In the order data passes through them:
     march           light in a volume, ray-marched without noise
     denoise         path-traced volumes without their noise, guided by march
     smoke           a density as a lit slab, as ink on paper, or as a volume
+    screen_motion   the motion of a volume in pixels
+    film            lens and film of a photograph
+    bonfire         flames over logs at dusk
+    chimney         smoke of a stack in the low sun
     particles       particles as foam on a river, obstacles as stones
     water           light under water: caustics, fog, shafts, sand
     seaweed         blades under water

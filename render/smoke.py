@@ -198,7 +198,7 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
     mi = backend.mitsuba("scalar_rgb")
     scene = _studio(mi, settings.bowl)
     if density.any():
-        scene["smoke"] = _medium(mi, density, voxel_size, origin, settings.extinction)
+        scene["smoke"] = medium(mi, density, voxel_size, origin, settings.extinction)
     light = _photographed(mi, scene, settings)
     if not settings.denoised:
         return light
@@ -229,7 +229,7 @@ def alone(density: np.ndarray, voxel_size: float, origin: tuple[float, float, fl
     mi = backend.mitsuba("scalar_rgb")
     scene = _studio(mi, None)
     del scene["backdrop"]
-    scene["smoke"] = _medium(mi, checked_density(density, 3), voxel_size, origin, settings.extinction)
+    scene["smoke"] = medium(mi, checked_density(density, 3), voxel_size, origin, settings.extinction)
     return _photographed(mi, scene, settings)
 
 
@@ -288,8 +288,8 @@ def _photographed(mi: Any, scene: dict[str, Any], settings: VolumeSettings) -> n
     return (light / settings.spp).astype(np.float32)
 
 
-def _medium(mi: Any, density: np.ndarray, voxel_size: float, origin: tuple[float, float, float],
-            extinction: float) -> dict[str, Any]:
+def medium(mi: Any, density: np.ndarray, voxel_size: float, origin: tuple[float, float, float],
+           extinction: float, albedo: tuple[float, float, float] = SMOKE_ALBEDO) -> dict[str, Any]:
     """The smoke as a Mitsuba shape: a box without a surface, cropped to `active_box`."""
     box = active_box(density)
     cells = np.array([s.stop - s.start for s in box[::-1]], np.float64)  # x, y, z
@@ -306,7 +306,7 @@ def _medium(mi: Any, density: np.ndarray, voxel_size: float, origin: tuple[float
             "sigma_t": {"type": "gridvolume", "grid": grid, "raw": True,
                         "to_world": transform().translate(list(low)).scale(list(size))},
             "scale": extinction,
-            "albedo": mitsuba_shapes.rgb(SMOKE_ALBEDO),
+            "albedo": mitsuba_shapes.rgb(albedo),
             "phase": {"type": "hg", "g": SMOKE_FORWARD},
         },
     }

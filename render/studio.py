@@ -178,6 +178,14 @@ def extruded(profile: np.ndarray, half_width: float) -> Mesh:
     return Mesh(vertices.reshape(-1, 3), faces.astype(np.uint32))
 
 
+def grid_faces(rows: int, columns: int) -> np.ndarray:
+    """Triangles (M, 3) uint32 of a grid of vertices that are counted row by row."""
+    row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
+    here = (row * columns + column).ravel()
+    return np.concatenate([np.stack([here, here + columns, here + 1], 1),
+                           np.stack([here + 1, here + columns, here + columns + 1], 1)]).astype(np.uint32)
+
+
 def revolved(profile: np.ndarray, segments: int = 192) -> Mesh:
     """The surface of revolution of a profile (N, 2) of (radius, y) around the y axis, bottom outside first."""
     profile = np.asarray(profile, np.float32)

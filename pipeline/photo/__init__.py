@@ -8,6 +8,7 @@ In the order data passes through them:
     clips       [clips]: the clips of the database, made or a user's, and their index; artifacts clip-fall-01,
                 index-fall-01 …
     sheet       clips to be looked at: flowloom clips sheet
+    made        targets that are made: a fire, smoke, a painting
     target      the photograph, its matte, what stands still in it, what the user wants
     frames      synth: the assignment, the motion, the frames and their mattes
     outputs     what a compositor or a paint program takes: the motion, the speed map

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.build.artifact import Artifact, Inputs
+from pipeline.build.artifact import Artifact, Inputs, Needs
 from pipeline.errors import attributed_to
 from pipeline.files import arrays, images
 from pipeline.photo.clips import names
 from pipeline.photo.tables import PhotoScene
-from pipeline.photo.target import check_target, read_target
+from pipeline.photo.target import check_target, target_inputs, target_of
 
 
 def cut_of(scene: PhotoScene) -> Any:
@@ -53,7 +53,7 @@ def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index:
     from synth.photo.assign import assign
     from synth.photo.fit import fitted
 
-    target, database, cut = read_target(scene), _database(inputs, index), cut_of(scene)
+    target, database, cut = target_of(scene, inputs), _database(inputs, index), cut_of(scene)
     of, found = assign(target.grey, target.fluid, database, cut, target.wanted, scene.assignment.settings())
     shown = found.shown(database)
     if scene.assignment.energy == "mended":
@@ -78,7 +78,7 @@ def widened(scene: PhotoScene, assignment: arrays.Arrays) -> str:
 
     angle = assignment["angle"]
     wide = int((angle > ANGLES[0]).sum())
-    guides = " and ".join(name for name, there in (("the strokes", scene.photo.strokes),
+    guides = " and ".join(name for name, there in (("the strokes", scene.photo.strokes or scene.photo.made),
                                                    ("the speed map", scene.photo.speed)) if there)
     return "" if not wide else (
         f"clips: {wide} of {len(angle)} pieces of the picture found too few candidates within {ANGLES[0]:.0f} degrees "
@@ -92,7 +92,7 @@ def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list
     from synth.photo.animate import Look, composed
     from synth.photo.integrate import differences
 
-    target, cut, (of, shown) = read_target(scene), cut_of(scene), assigned(inputs)
+    target, cut, (of, shown) = target_of(scene, inputs), cut_of(scene), assigned(inputs)
     box = target.box(cut.size)
     part = target.part(box)
     moved = of._replace(corner=of.corner - [box[0].start, box[1].start])
@@ -120,7 +120,7 @@ def make_mattes(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterato
     """The matte of each frame (h, w, 3), which moves with scene.photo.dynamics."""
     from synth.photo.animate import mattes
 
-    target = read_target(scene)
+    target = target_of(scene, inputs)
     fluid = np.stack([np.rint(255 * np.clip(_display(inputs, frame).mean(axis=2), 0, 1)).astype(np.uint8)
                       for frame in range(1, scene.frames + 1)])
     found = mattes(target, fluid, scene.photo.dynamics)
@@ -133,7 +133,7 @@ def make_frames(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterato
     from render import tonemap
     from synth.photo.animate import over_background
 
-    target = read_target(scene)
+    target = target_of(scene, inputs)
     for frame in frames:
         matte = np.ascontiguousarray(inputs.read("mattes", frame)[::-1, :, 0])
         picture = over_background(target, _display(inputs, frame), matte)
@@ -143,11 +143,13 @@ def make_frames(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterato
 def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """All after the clips."""
     clips, index = names(scene, "clip"), names(scene, "index")
+    target: Needs = tuple((name, "once") for name in target_inputs(scene))
     return (
         Artifact("assignment", "synth", arrays.ARRAYS, ("photo", "assignment"),
-                 (("codebook", "once"), *((name, "once") for name in (*index, *clips))), make_assignment,
+                 (*target, ("codebook", "once"), *((name, "once") for name in (*index, *clips))), make_assignment,
                  {"index": index, "clips": clips}, animated=False, check=check_target, note=widened),
         Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
-                 (("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
-        Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (("fluid", "every"),), make_mattes),
-        Artifact("frames", "synth", images.LIGHT, ("photo",), (("fluid", "same"), ("mattes", "same")), make_frames))
+                 (*target, ("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
+        Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (*target, ("fluid", "every")), make_mattes),
+        Artifact("frames", "synth", images.LIGHT, ("photo",), (*target, ("fluid", "same"), ("mattes", "same")),
+                 make_frames))

@@ -6,6 +6,7 @@ from pipeline.build.artifact import Artifact
 from pipeline.build.method import Method
 from pipeline.photo.clips import clip_artifacts
 from pipeline.photo.frames import frame_artifacts
+from pipeline.photo.made import made_artifacts
 from pipeline.photo.neighbours import neighbour_artifacts
 from pipeline.photo.outputs import output_artifacts
 from pipeline.photo.panels import panels, view_artifacts
@@ -16,8 +17,8 @@ from pipeline.photo.tables import PhotoScene
 
 def artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """All artifacts of a scene, each after those it is made from."""
-    return (*clip_artifacts(scene), *frame_artifacts(scene), *output_artifacts(scene), *piece_artifacts(scene),
-            *neighbour_artifacts(scene), *view_artifacts(scene))
+    return (*made_artifacts(scene), *clip_artifacts(scene), *frame_artifacts(scene), *output_artifacts(scene),
+            *piece_artifacts(scene), *neighbour_artifacts(scene), *view_artifacts(scene))
 
 
 METHOD = Method("okabe11", "photo", Scene, (photo_fits,), artifacts, panels)

@@ -17,7 +17,7 @@ from pipeline.files import arrays
 from pipeline.photo.clips import names
 from pipeline.photo.frames import assigned, cut_of, frames_of
 from pipeline.photo.tables import OfPair, PhotoScene
-from pipeline.photo.target import read_target
+from pipeline.photo.target import target_inputs, target_of
 from pipeline.photo.views import Pictures, View, picture
 
 
@@ -37,7 +37,7 @@ def make_place(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Pictures
     """The photograph round the neighbours, with the outline of each."""
     from render import plot, steps, tonemap
 
-    whole, corner, size = read_target(scene).picture, inputs.read("neighbours")["corner"], scene.assignment.piece
+    whole, corner, size = target_of(scene, inputs).picture, inputs.read("neighbours")["corner"], scene.assignment.piece
     shape = np.minimum([2 * size, 3 * size], whole.shape[:2])
     low = np.clip(np.rint(corner.mean(axis=0)).astype(int) + (size - shape) // 2, 0, np.array(whole.shape[:2]) - shape)
     part = whole[low[0]:low[0] + shape[0], low[1]:low[1] + shape[1]]
@@ -97,7 +97,8 @@ def neighbour_views(scene: PhotoScene, name: str) -> list[View]:
     sides = (0, "left"), (1, "right")
     match name:
         case "neighbours":
-            return [View(picture("place", ("photo", "assignment.piece", *reads), of, make_place), "two pieces", full)]
+            shown = picture("place", ("photo", "assignment.piece", *reads), (*target_inputs(scene), *of), make_place)
+            return [View(shown, "two pieces", full)]
         case "neighbour-pieces":
             return [View(picture(f"piece-{side}", reads, of, make_neighbour, side=number), f"clip of the {side} piece",
                          narrow(scene)) for number, side in sides]

@@ -13,21 +13,24 @@ from pipeline.photo.pieces import piece_views
 from pipeline.photo.tables import OfPair, OfPiece, PhotoScene
 from pipeline.photo.views import View, target_view
 
+MOVING = {"result": ("frames", "frame"), "matte": ("mattes", "matte of frame")}
+"""Panels that the still shows at each moment: their artifacts, and what it calls them."""
+
 
 def panels(scene: PhotoScene) -> tuple[Panel, ...]:
-    """The panels of the scene's figure; with moments, in the still one result for each."""
+    """The panels of the scene's figure; with moments, in the still one result and one matte for each."""
     full = scene.figure.panel
     made: list[Panel] = []
     for shown in _shown(scene):
         if isinstance(shown, View):
             made.append(Panel(shown.label, shown.artifact.name, shown.width, "straight", legend=shown.legend,
                               border=shown.border))
-        elif shown == "result" and scene.figure.moments:
-            made += [Panel(f"frame {moment}", "frames", full, "straight", frame=moment, shown_in="still")
-                     for moment in scene.figure.moments]
-            made.append(Panel("result", "frames", full, "straight", shown_in="animation"))
-        else:
-            made.append(Panel(shown, {"matte": "mattes", "result": "frames"}[shown], full, "straight"))
+            continue
+        artifact, name = MOVING[shown]
+        for moment in scene.figure.moments:
+            made.append(Panel(f"{name} {moment}", artifact, full, "straight", frame=moment, shown_in="still"))
+        made.append(Panel(shown, artifact, full, "straight",
+                          shown_in="animation" if scene.figure.moments else "both"))
     return tuple(made)
 
 
@@ -47,7 +50,7 @@ def _shown(scene: PhotoScene) -> Iterator[str | View]:
                     yield from piece_views(scene, name, number)
             continue
         for name in names:
-            if name in ("matte", "result"):
+            if name in MOVING:
                 yield name
             elif name in get_args(OfPair):
                 yield from neighbour_views(scene, name)

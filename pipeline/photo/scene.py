@@ -23,7 +23,8 @@ class Scene(PhotoScene):
 
 
 def photo_fits(scene: Scene) -> Faults:
-    """Check: a database that has clips, pieces that fit into them, moments there are."""
+    """Check: one target, a database that has clips, pieces that fit into them, moments there are."""
+    yield from _target_fits(scene)
     unknown = [family for family in scene.clips.families if family not in _families()]
     if unknown:
         yield "clips.families", f"there is no family {unknown[0]!r}, only {', '.join(_families())}"
@@ -49,8 +50,21 @@ def photo_fits(scene: Scene) -> Faults:
     for name in scene.figure.panels:
         if name in get_args(OfPiece) and not scene.figure.pieces:
             yield "figure.pieces", f"is empty, and the panel \"{name}\" shows a piece"
-        if name in ("strokes", "orientation") and not scene.photo.strokes:
+        if name in ("strokes", "orientation") and not (scene.photo.strokes or scene.photo.made):
             yield "photo.strokes", f"is empty, and the panel \"{name}\" shows the strokes"
+
+
+def _target_fits(scene: Scene) -> Faults:
+    """A file with its matte, or a made picture without files in their place."""
+    photo = scene.photo
+    if photo.made is None:
+        for name, file in (("file", photo.file), ("matte", photo.matte)):
+            if file is None:
+                yield f"photo.{name}", "is missing, and so is photo.made"
+    else:
+        for name, file in (("file", photo.file), ("matte", photo.matte), ("background", photo.background)):
+            if file is not None:
+                yield f"photo.{name}", f"is given, and so is photo.made = \"{photo.made}\", which has its own"
 
 
 def _families() -> list[str]:

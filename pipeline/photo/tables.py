@@ -19,15 +19,18 @@ Share01 = Annotated[float, Field(ge=0, le=1)]
 class Photo(Table):
     """The photograph or painting, and what the user says of it."""
 
-    file: Asset = key("the picture: JPEG, PNG, TIFF")
-    matte: Asset = key("a grey picture of the same size: white where the fluid is (§3)")
+    file: Asset | None = key("the picture: JPEG, PNG, TIFF; none: `made` says it", None)
+    made: Literal["fire", "smoke", "painting"] | None = key(
+        "in place of a file, a target that is made, with its matte, its background and, unless the scene gives them, "
+        "its strokes: a bonfire, the smoke of a stack, a painting of a waterfall; it counts as 640 x 480 pixels", None)
+    matte: Asset | None = key("of a file: a grey picture of the same size, white where the fluid is (§3)", None)
     frozen: Asset | None = key("a grey picture of the same size: white where something stands still in the fluid, "
                                "as stones and ledges do; none: nothing", None)
     background: Asset | None = key("a picture of the same size that is seen where a dynamic matte leaves (§6); none: "
                                    "inpainted", None)
     strokes: Annotated[tuple[Stroke, ...], Strict(False)] = key(
         "strokes along the flow, from their first point to their last, each an array of points [x, y] of the file, "
-        "from its upper left corner (§5, figure 8); none: the clips alone decide", (), max_length=1000)
+        "from its upper left corner (§5, figure 8); none: a made picture's, or none", (), max_length=1000)
     speeds: Annotated[tuple[Annotated[float, Field(ge=0, le=100)], ...], Strict(False)] = key(
         "a speed of each stroke, as many as strokes; none: the clips alone decide, or photo.speed", (),
         "pixels of the output per frame", max_length=1000)
@@ -86,13 +89,13 @@ ScenePlace = Annotated[tuple[Share01, Share01], Strict(False)]
 
 
 class Figure(FigureTable):
-    """The panels of X.png and X.mp4. With moments, the still shows the result once for each of them."""
+    """The panels of X.png and X.mp4. With moments, the still shows result and matte once for each of them."""
 
     panels: Annotated[tuple[PanelName, ...], Strict(False)] = key(
         "panels from left to right; those that show a piece stand once for each of figure.pieces, in turn, as far as "
         "they follow each other", ("target", "result"), min_length=1)
     moments: Annotated[tuple[Annotated[int, Field(ge=1, le=100000)], ...], Strict(False)] = key(
-        "frames at which the still shows the result; none: figure.frame alone", (), "frames", max_length=16)
+        "frames at which the still shows result and matte; none: figure.frame alone", (), "frames", max_length=16)
 
     pieces: Annotated[tuple[ClipPiece, ...], Strict(False)] = key(
         "pieces of clips whose processing is shown (figures 5 to 7), each [clip, x, y]: its clip, as \"fall-01\" or "

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.build.artifact import Inputs
 from pipeline.errors import BadInput, InvalidValue
-from pipeline.files import pictures
+from pipeline.files import arrays, pictures
+from pipeline.photo.made import SHAPE, STROKES
 from pipeline.photo.tables import PhotoScene
 
 LARGEST = 8192
@@ -18,29 +20,67 @@ FULL = 0.5
 """Grey from which a mask holds."""
 
 
-def read_target(scene: PhotoScene) -> Any:
+def read_target(scene: PhotoScene, made: arrays.Arrays | None = None) -> Any:
     """The synth.photo.animate.Target of a scene, at its width.
 
+    made  the arrays of `made`, where the scene asks for a made picture
     Raises BadInput for a file that is no use, InvalidValue for strokes that are none.
     """
     from synth.photo.animate import Target
 
+    shape, picture, matte, background = _read(scene) if made is None else _made(made)
+    frozen = _frozen(scene, shape)
+    if frozen is not None and not ((matte >= FULL) & ~frozen).any():
+        raise BadInput(scene.photo.frozen or "", "photo.frozen", "covers all of the matte")
+    return Target(picture, matte, background, frozen, _wanted(scene, shape, frozen))
+
+
+def target_inputs(scene: PhotoScene) -> tuple[str, ...]:
+    """The artifacts that `target_of` reads."""
+    return () if scene.photo.made is None else ("made",)
+
+
+def target_of(scene: PhotoScene, inputs: Inputs) -> Any:
+    """The target of a scene for an artifact that declares `target_inputs`."""
+    return read_target(scene, inputs.read("made") if "made" in inputs else None)
+
+
+Read = tuple[tuple[int, int], np.ndarray, np.ndarray, np.ndarray | None]
+"""Rows and columns in which the user counts; picture, matte and background at the scene's width, lowest row first."""
+
+
+def _read(scene: PhotoScene) -> Read:
+    """The user's picture, its matte and what is behind the fluid."""
     photo = scene.photo
-    read = pictures.read_scaled(photo.file, "photo.file", photo.width, 1.0, LARGEST)
+    file, matte_file = Path(photo.file or ""), Path(photo.matte or "")
+    read = pictures.read_scaled(file, "photo.file", photo.width, 1.0, LARGEST)
     if min(read.of) < SMALLEST:
-        raise BadInput(photo.file, "photo.file", f"has {read.of[1]} x {read.of[0]} pixels: too few to show a fluid")
+        raise BadInput(file, "photo.file", f"has {read.of[1]} x {read.of[0]} pixels: too few to show a fluid")
     picture = _lowest_first(read.picture)
-    matte = _mask(scene, photo.matte, "photo.matte", read.of)
+    matte = _mask(scene, matte_file, "photo.matte", read.of)
     inside = matte >= FULL
     if not inside.any():
-        raise BadInput(photo.matte, "photo.matte", "is empty: nothing is white, so there is nothing to animate")
+        raise BadInput(matte_file, "photo.matte", "is empty: nothing is white, so there is nothing to animate")
     if np.ptp(picture[inside], axis=0).max(initial=0) <= 1 / 255:
-        raise BadInput(photo.file, "photo.file", "is of one colour inside the matte")
-    frozen = None if photo.frozen is None else _mask(scene, photo.frozen, "photo.frozen", read.of) >= FULL
-    if frozen is not None and not (inside & ~frozen).any():
-        raise BadInput(scene.photo.frozen or "", "photo.frozen", "covers all of the matte")
-    background = _background(scene, read.of, picture, matte)
-    return Target(picture, matte, background, frozen, _wanted(scene, read.of, frozen))
+        raise BadInput(file, "photo.file", "is of one colour inside the matte")
+    return read.of, picture, matte, _background(scene, read.of, picture, matte)
+
+
+def _made(made: arrays.Arrays) -> Read:
+    """The same of a made picture, which has the scene's width."""
+    from render import tonemap
+
+    def display(name: str) -> np.ndarray:
+        return _lowest_first(tonemap.to_srgb(made[name]))
+
+    return SHAPE, display("picture"), _lowest_first(made["matte"]), (
+        display("background") if "background" in made else None)
+
+
+def _frozen(scene: PhotoScene, shape: tuple[int, int]) -> np.ndarray | None:
+    """What stands still in the fluid, (Y, X) bool."""
+    file = scene.photo.frozen
+    return None if file is None else _mask(scene, file, "photo.frozen", shape) >= FULL
 
 
 def _background(scene: PhotoScene, shape: tuple[int, int], picture: np.ndarray, matte: np.ndarray) -> np.ndarray | None:
@@ -103,7 +143,9 @@ def _speed_map(scene: PhotoScene, size: tuple[int, int]) -> np.ndarray | None:
 
 def read_strokes(scene: PhotoScene) -> list[np.ndarray]:
     """The strokes, each (K, 2) float64: x, y in pixels of the output, whose lowest left pixel is 0, 0."""
-    rows, columns = pictures.read_foreign(scene.photo.file, "photo.file").shape[:2]
+    if scene.photo.made is not None:
+        return _strokes(scene, SHAPE)
+    rows, columns = pictures.read_foreign(Path(scene.photo.file or ""), "photo.file").shape[:2]
     return _strokes(scene, (rows, columns))
 
 
@@ -116,7 +158,7 @@ def _strokes(scene: PhotoScene, shape: tuple[int, int]) -> list[np.ndarray]:
     scale = photo.width / shape[1]
     height = max(1, round(shape[0] * scale))
     strokes = []
-    for number, stroke in enumerate(photo.strokes):
+    for number, stroke in enumerate(photo.strokes or STROKES.get(photo.made or "", ())):
         points = np.array(stroke, np.float64)
         if ((points < -0.5) | (points > np.array(shape[::-1]) - 0.5)).any():
             raise InvalidValue(f"photo.strokes[{number}]", f"leaves the picture of {shape[1]} x {shape[0]} pixels")
@@ -128,5 +170,8 @@ def _strokes(scene: PhotoScene, shape: tuple[int, int]) -> list[np.ndarray]:
 
 
 def check_target(scene: PhotoScene) -> None:
-    """Refuses a target before anything is made."""
-    read_target(scene)
+    """Refuses a target before anything is made; of a made one what the scene says of it."""
+    if scene.photo.made is None:
+        read_target(scene)
+    else:
+        _wanted(scene, SHAPE, _frozen(scene, SHAPE))

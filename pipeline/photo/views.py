@@ -16,7 +16,7 @@ from pipeline.files import images
 from pipeline.photo.clips import names
 from pipeline.photo.outputs import speed_map
 from pipeline.photo.tables import PhotoScene
-from pipeline.photo.target import read_strokes, read_target
+from pipeline.photo.target import read_strokes, target_inputs, target_of
 
 Pictures = Iterator[tuple[int, np.ndarray]]
 
@@ -43,21 +43,21 @@ def make_target(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Picture
     """The photograph."""
     from render import tonemap
 
-    yield 0, tonemap.from_srgb(read_target(scene).picture)[::-1].astype(np.float32)
+    yield 0, tonemap.from_srgb(target_of(scene, inputs).picture)[::-1].astype(np.float32)
 
 
 def make_strokes(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Pictures:
     """The photograph with the strokes on it (fig. 8 a)."""
     from render import steps, tonemap
 
-    yield 0, tonemap.from_srgb(steps.strokes(read_target(scene).picture, read_strokes(scene), scene.figure.panel))
+    yield 0, tonemap.from_srgb(steps.strokes(target_of(scene, inputs).picture, read_strokes(scene), scene.figure.panel))
 
 
 def make_orientation(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Pictures:
     """The orientation map that is interpolated from the strokes (fig. 8 b)."""
     from render import steps, tonemap
 
-    target, width = read_target(scene), scene.figure.panel
+    target, width = target_of(scene, inputs), scene.figure.panel
     yield 0, tonemap.from_srgb(steps.orientation(target.wanted.orientation, target.fluid, width, scene.seed))
 
 
@@ -80,7 +80,7 @@ def make_database(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: l
     """The first frame of each clip of the database, on one sheet (fig. 3)."""
     from render import contact_sheet, tonemap
 
-    rows, columns = read_target(scene).matte.shape
+    rows, columns = target_of(scene, inputs).matte.shape
     # copies: a view would keep the whole of each clip in memory
     first = [inputs.read(name)["luma"][0].copy() for name in clips]
     yield 0, tonemap.from_srgb(contact_sheet.thumbnails(first, scene.figure.panel, columns / rows))
@@ -88,15 +88,15 @@ def make_database(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: l
 
 def target_view(scene: PhotoScene, name: str) -> View:
     """The view of a panel that shows the photograph as a whole, or the database."""
-    full, assignment = scene.figure.panel, ("assignment",)
+    full, assignment, target = scene.figure.panel, ("assignment",), target_inputs(scene)
     match name:
         case "target":
-            return View(picture(name, ("photo",), (), make_target), name, full)
+            return View(picture(name, ("photo",), target, make_target), name, full)
         case "strokes":
-            return View(picture(name, ("photo", "figure.panel"), (), make_strokes), name, full)
+            return View(picture(name, ("photo", "figure.panel"), target, make_strokes), name, full)
         case "orientation":
-            return View(picture(name, ("photo", "figure.panel", "seed"), (), make_orientation), "orientation map", full,
-                        legend=True)
+            return View(picture(name, ("photo", "figure.panel", "seed"), target, make_orientation), "orientation map",
+                        full, legend=True)
         case "speed":
             return View(picture(name, ("photo.fastest",), assignment, make_speed),
                         f"speed map, white: {scene.photo.fastest:g} pixels per frame", full)
@@ -104,6 +104,6 @@ def target_view(scene: PhotoScene, name: str) -> View:
             return View(picture(name, ("figure.panel",), assignment, make_motion), name, full, legend=True)
         case "database":
             clips = names(scene, "clip")
-            return View(picture(name, ("photo", "figure.panel"), tuple(clips), make_database, clips=clips),
+            return View(picture(name, ("photo", "figure.panel"), (*target, *clips), make_database, clips=clips),
                         f"database, {len(clips)} clip{'s' * (len(clips) > 1)}", full, border=False)
     raise ValueError(f"there is no view {name!r}")

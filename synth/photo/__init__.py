@@ -17,6 +17,13 @@ each with its true velocity, and each repeats: frame T is frame 0.
     clips    the families, and the catalogue of 150 clips
     checks   what a clip must fulfil
 
+Targets that are made, since no photograph of fire or smoke may be shipped:
+
+    rising    where and when what rises left the ground, in space
+    flames    a wood fire, for `render.bonfire`
+    plume     the smoke of a stack, for `render.chimney`
+    painting  a landscape in oils
+
 Then the database (§4), the assignment (§5) and the synthesis (§6):
 
     pieces      squares of scaled, turned and mirrored clips, and their pixels

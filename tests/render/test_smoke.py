@@ -91,7 +91,7 @@ def alone(density: np.ndarray, voxel: float, origin: tuple[float, float, float],
           spp: int) -> np.ndarray:
     """`density` in nothing but a constant light of 1 from all over, 16 x 16 pixels."""
     mi = backend.mitsuba("scalar_rgb")
-    scene = {"sky": {"type": "constant"}, "smoke": smoke._medium(mi, density, voxel, origin, extinction)}
+    scene = {"sky": {"type": "constant"}, "smoke": smoke.medium(mi, density, voxel, origin, extinction)}
     return smoke._photographed(mi, scene, smoke.VolumeSettings(width=16, height=16, spp=spp, camera=CAMERA))
 
 

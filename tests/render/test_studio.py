@@ -122,3 +122,13 @@ def test_a_mesh_moves_as_a_whole() -> None:
     shift = moved.vertices - studio.backdrop().vertices
     assert shift == pytest.approx(np.broadcast_to([1.0, 2.0, 3.0], shift.shape), abs=1e-6)
     assert moved.vertices.dtype == np.float32
+
+
+def test_the_faces_of_a_grid_cover_it_once() -> None:
+    """Six cells of two triangles, all turned the same way."""
+    faces = studio.grid_faces(3, 4)
+    assert faces.shape == (12, 3) and faces.dtype == np.uint32
+    y, x = np.divmod(faces.astype(float), 4)
+    area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    np.testing.assert_array_equal(area, -1.0)
+    assert len({tuple(face) for face in np.sort(faces, axis=1)}) == 12
