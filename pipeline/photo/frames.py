@@ -85,25 +85,48 @@ def widened(scene: PhotoScene, assignment: arrays.Arrays) -> str:
         f"of {guides}; the angle was widened, to {angle.max():.0f} at most")
 
 
+def _boxed(scene: PhotoScene, target: Any, inputs: Inputs) -> tuple[tuple[slice, slice], Any]:
+    """The part of the target round its matte, and the nodes as they lie in it."""
+    of, box = assigned(inputs)[0], target.box(cut_of(scene).size)
+    return box, of._replace(corner=of.corner - [box[0].start, box[1].start])
+
+
+def make_displacement(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
+                      ) -> Iterator[tuple[int, arrays.Arrays]]:
+    """How far the fluid is from its place in each frame, in the part of the picture round the matte (§6)."""
+    from synth.photo.boundary import displacements
+    from synth.photo.integrate import motion_changes
+
+    target, shown = target_of(scene, inputs), assigned(inputs)[1]
+    box, of = _boxed(scene, target, inputs)
+    rows, columns = target.matte[box].shape
+    changes = motion_changes(of, shown, frames_of(inputs, clips), (rows, columns), cut_of(scene), scene.frames,
+                             scene.seed)
+    mean = np.ascontiguousarray(inputs.read("assignment")["motion"][box])
+    yield 0, {"by": displacements(mean, changes, scene.photo.dynamics).astype(np.float16)}
+
+
 def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list[str],
                ) -> Iterator[tuple[int, np.ndarray]]:
     """The fluid of each frame, everywhere, before the matte cuts it (§6)."""
     from render import tonemap
     from synth.photo.animate import Look, composed
+    from synth.photo.boundary import displaced
     from synth.photo.integrate import differences
 
-    target, cut, (of, shown) = target_of(scene, inputs), cut_of(scene), assigned(inputs)
-    box = target.box(cut.size)
+    target, cut, shown = target_of(scene, inputs), cut_of(scene), assigned(inputs)[1]
+    box, of = _boxed(scene, target, inputs)
     part = target.part(box)
-    moved = of._replace(corner=of.corner - [box[0].start, box[1].start])
     rows, columns = part.matte.shape
-    more = differences(moved, shown, frames_of(inputs, clips), (rows, columns), cut, scene.frames, scene.seed,
+    more = differences(of, shown, frames_of(inputs, clips), (rows, columns), cut, scene.frames, scene.seed,
                        scene.photo.blending)
+    by = inputs.read("displacement")["by"] if "displacement" in inputs else None
     look = Look(scene.photo.carried, scene.photo.feature, scene.photo.strength, scene.photo.matching)
     whole, moves = target.picture.copy(), inputs.read("assignment")["motion"][box]
     for frame, picture in enumerate(composed(part, more, moves, look, scene.seed), start=1):
         if frame in frames:
-            whole[box] = np.clip(picture, 0, 1)
+            shape = picture if by is None else displaced(picture, by[frame - 1].astype(np.float32))
+            whole[box] = np.clip(shape, 0, 1)
             yield frame, tonemap.from_srgb(whole)[::-1].astype(np.float32)
         if frame == frames[-1]:
             break
@@ -118,14 +141,29 @@ def _display(inputs: Inputs, frame: int) -> np.ndarray:
 
 def make_mattes(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
     """The matte of each frame (h, w, 3), which moves with scene.photo.dynamics."""
-    from synth.photo.animate import mattes
+    from synth.photo.animate import matte_displaced, mattes_mixed
 
     target = target_of(scene, inputs)
-    fluid = np.stack([np.rint(255 * np.clip(_display(inputs, frame).mean(axis=2), 0, 1)).astype(np.uint8)
-                      for frame in range(1, scene.frames + 1)])
-    found = mattes(target, fluid, scene.photo.dynamics)
+    if "displacement" in inputs:
+        by, box = inputs.read("displacement")["by"], target.box(cut_of(scene).size)
+
+        def matte(frame: int) -> np.ndarray:
+            whole = np.zeros((*target.matte.shape, 2), np.float32)
+            whole[box] = by[frame - 1]
+            return np.asarray(matte_displaced(target, whole))
+    elif "fluid" in inputs:
+        fluid = np.stack([np.rint(255 * np.clip(_display(inputs, frame).mean(axis=2), 0, 1)).astype(np.uint8)
+                          for frame in range(1, scene.frames + 1)])
+        found = mattes_mixed(target, fluid, scene.photo.dynamics)
+
+        def matte(frame: int) -> np.ndarray:
+            return np.asarray(found[frame - 1])
+    else:
+        def matte(frame: int) -> np.ndarray:
+            return np.asarray(target.matte)
+
     for frame in frames:
-        yield frame, np.repeat(found[frame - 1][::-1, :, None], 3, axis=2)
+        yield frame, np.repeat(matte(frame)[::-1, :, None], 3, axis=2)
 
 
 def make_frames(scene: PhotoScene, inputs: Inputs, frames: list[int]) -> Iterator[tuple[int, np.ndarray]]:
@@ -144,12 +182,23 @@ def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """All after the clips."""
     clips, index = names(scene, "clip"), names(scene, "index")
     target: Needs = tuple((name, "once") for name in target_inputs(scene))
-    return (
+    all_clips: Needs = tuple((name, "once") for name in clips)
+    displaced = scene.photo.dynamics > 0 and scene.photo.boundary == "displaced"
+    moves: Needs = (("displacement", "once"),) if displaced else ()
+    made = [
         Artifact("assignment", "synth", arrays.ARRAYS, ("photo", "assignment"),
-                 (*target, ("codebook", "once"), *((name, "once") for name in (*index, *clips))), make_assignment,
-                 {"index": index, "clips": clips}, animated=False, check=check_target, note=widened),
+                 (*target, ("codebook", "once"), *((name, "once") for name in index), *all_clips), make_assignment,
+                 {"index": index, "clips": clips}, animated=False, check=check_target, note=widened)]
+    if displaced:
+        made.append(Artifact(
+            "displacement", "synth", arrays.ARRAYS, ("photo", "assignment.piece", "frames", "seed"),
+            (*target, ("assignment", "once"), *all_clips), make_displacement, {"clips": clips}, animated=False))
+    shape: Needs = moves or ((("fluid", "every"),) if scene.photo.dynamics > 0 else ())
+    return (
+        *made,
         Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
-                 (*target, ("assignment", "once"), *((name, "once") for name in clips)), make_fluid, {"clips": clips}),
-        Artifact("mattes", "synth", images.LIGHT, ("photo", "frames"), (*target, ("fluid", "every")), make_mattes),
+                 (*target, *moves, ("assignment", "once"), *all_clips), make_fluid, {"clips": clips}),
+        Artifact("mattes", "synth", images.LIGHT, ("photo", "assignment.piece", "frames"), (*target, *shape),
+                 make_mattes),
         Artifact("frames", "synth", images.LIGHT, ("photo",), (*target, ("fluid", "same"), ("mattes", "same")),
                  make_frames))

@@ -52,6 +52,9 @@ class Photo(Table):
         "\"shares\": they do, as in the paper", "roots")
     dynamics: Annotated[float, Field(ge=0, lt=1)] = key(
         "τ of the dynamic boundary of fire and smoke (§6); 0: the matte stands still", 0.0)
+    boundary: Literal["displaced", "mixed"] = key(
+        "what a dynamic boundary is: \"displaced\", and the fluid with it, by the changing motion of the clips; "
+        "\"mixed\" with the one before, as in the paper", "displaced")
 
 
 class Assignment(Table):

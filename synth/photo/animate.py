@@ -18,7 +18,7 @@ import numpy as np
 from synth.photo import photograph
 from synth.photo.appearance import added, average, extended, gains, matched
 from synth.photo.assign import Nodes, Shown, Wanted
-from synth.photo.boundary import dynamic_matte
+from synth.photo.boundary import displaced, mixed, with_area
 from synth.photo.integrate import Differences, motion_field
 from synth.photo.motion import optical_flow
 from synth.photo.pieces import Cut
@@ -161,15 +161,18 @@ def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, s
         yield shown
 
 
-def mattes(target: Target, fluid: np.ndarray, dynamics: float) -> np.ndarray:
-    """The matte of each frame: (T, Y, X) float32, moved with `dynamics` (τ of §6); 0: it stands still.
+def mattes_mixed(target: Target, fluid: np.ndarray, dynamics: float) -> np.ndarray:
+    """The matte of each frame as in the paper: (T, Y, X) float32, moved with `dynamics` (τ of §6).
 
     fluid  (T, Y, X) uint8, grey: the frames of `composed`, whose optical flow is "the motion field M_i of the
            synthesized animation"
     """
-    if dynamics == 0:
-        return np.broadcast_to(target.matte, fluid.shape)
-    return dynamic_matte(target.matte, optical_flow(fluid), dynamics)
+    return mixed(target.matte, optical_flow(fluid), dynamics)
+
+
+def matte_displaced(target: Target, by: np.ndarray) -> np.ndarray:
+    """The matte (Y, X) float32 displaced by D (Y, X, 2), with its area."""
+    return with_area(displaced(target.matte, by), float(target.matte.sum(dtype=np.float64)))
 
 
 def over_background(target: Target, shown: np.ndarray, matte: np.ndarray) -> np.ndarray:

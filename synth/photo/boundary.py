@@ -2,46 +2,85 @@
 
 "We repeatedly synthesize the time-varying alpha matte B_i: B_{i+1} = τ W_i(B_i) + (1 - τ) α, where B_1 is equal to α
 and τ controls the dynamics of B_i. We also apply an area-preserving adjustment each time B_i is computed."
+
+A matte that is mixed so becomes soft, and stands where the motion is steady (`mixed`). Ours is displaced (`displaced`),
+and the fluid with it: by what the motion of the clips differs from its mean, carried along that mean, so that a flame
+licks and a wave of smoke rises:
+
+    D_{i+1} = τ W(D_i + M_i - M)    B_i = α(x - D_i)
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+FORGOTTEN = 0.05
+"""What may be left of the start of a loop."""
 NEAR = 5
 """Pixels round a hidden one from which the background is made up."""
 ROUNDS = 30
 """Halvings that find the shift which keeps the area."""
 
 
-def dynamic_matte(matte: np.ndarray, motion: np.ndarray, dynamics: float) -> np.ndarray:
+def mixed(matte: np.ndarray, motion: np.ndarray, dynamics: float) -> np.ndarray:
     """The matte in each frame of a loop: (T, Y, X) float32 in 0..1, all of one area.
 
     matte     (Y, X) in 0..1, α
     motion    (T, Y, X, 2), pixels per frame: of each frame, a loop
     dynamics  τ, 0..1: 0 stands still
-    Two laps: the second begins as the first ended, and what is left of the difference is mixed away over the lap.
     Raises ValueError unless 0 <= τ < 1.
     """
     if not 0 <= dynamics < 1:
         raise ValueError(f"the dynamics of a matte are in [0, 1), not {dynamics}")
     alpha = matte.astype(np.float32)
     area = float(alpha.sum(dtype=np.float64))
-    laps, now = [], alpha
-    for _ in range(2):
-        lap = []
-        for velocity in motion:
-            lap.append(now)
-            now = _with_area(dynamics * _moved(now, velocity) + (1 - np.float32(dynamics)) * alpha, area)
-        laps.append(np.stack(lap))
-    first, second = laps[1], now
-    part = (np.arange(len(first)) / len(first)).astype(np.float32)[:, None, None]
-    # after the lap comes `second` where `first[0]` should be
-    return np.stack([_with_area(frame, area) for frame in first + part * (first[0] - second)])
+    found = _loop(alpha, motion, dynamics, lambda now, velocity: with_area(
+        dynamics * _moved(now, velocity) + (1 - np.float32(dynamics)) * alpha, area))
+    return np.stack([with_area(frame, area) for frame in found])
+
+
+def displacements(mean: np.ndarray, changes: np.ndarray, dynamics: float) -> np.ndarray:
+    """How far the fluid is from its place in each frame of a loop: D (T, Y, X, 2) float32, pixels.
+
+    mean      (Y, X, 2), pixels per frame: the motion that carries waves on, M
+    changes   (T, Y, X, 2), pixels per frame: what the motion of each frame differs from its mean, M_i - M, a loop
+    dynamics  τ, 0..1: how long a displacement lasts, 1 / (1 - τ) frames
+    Raises ValueError unless 0 <= τ < 1.
+    """
+    if not 0 <= dynamics < 1:
+        raise ValueError(f"the dynamics of a matte are in [0, 1), not {dynamics}")
+    tau = np.float32(dynamics)
+    start = np.zeros(mean.shape, np.float32)
+    return _loop(start, changes, dynamics, lambda now, change: tau * _moved(now + change, mean))
+
+
+def displaced(values: np.ndarray, by: np.ndarray) -> np.ndarray:
+    """values (Y, X[, C]) float32 where they are when displaced by D (Y, X, 2), pixels."""
+    return _moved(values, by)
+
+
+def _loop(start: np.ndarray, steps: np.ndarray, dynamics: float, following: Callable[..., np.ndarray]) -> np.ndarray:
+    """The states of a recursion through a loop of steps (T, …), as a loop: (T, …).
+
+    As many laps as it takes until the start is forgotten, of which `dynamics` is left in each step; what is left of the
+    difference is mixed away over the last.
+    """
+    length = len(steps)
+    laps = 2 if dynamics == 0 else max(2, 1 + int(np.ceil(np.log(FORGOTTEN) / (length * np.log(dynamics)))))
+    now, lap = start, np.empty((length, *start.shape), np.float32)
+    for _ in range(laps):
+        for number, step in enumerate(steps):
+            lap[number] = now
+            now = following(now, step)
+    part = (np.arange(length) / length).astype(np.float32).reshape(-1, *(1,) * start.ndim)
+    # after the lap comes `now` where `lap[0]` should be
+    return np.asarray(lap + part * (lap[0] - now))
 
 
 def _moved(values: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """values (Y, X) one frame later."""
+    """values (Y, X[, C]) moved by a velocity (Y, X, 2)."""
     import cv2
 
     y, x = np.mgrid[:values.shape[0], :values.shape[1]].astype(np.float32)
@@ -49,7 +88,7 @@ def _moved(values: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     return np.asarray(cv2.remap(values, x - u, y - v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
 
 
-def _with_area(values: np.ndarray, area: float) -> np.ndarray:
+def with_area(values: np.ndarray, area: float) -> np.ndarray:
     """values (Y, X) shifted and cut to 0..1 so that their sum is `area`, where a shift of its edges can do that."""
     soft = (values > 1e-3) & (values < 1 - 1e-3)
     if not soft.any():

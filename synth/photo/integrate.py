@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 
 from synth.photo.assign import Nodes, Shown
+from synth.photo.motion import optical_flow
 from synth.photo.pieces import FITS, VERSIONS, Cut, pixels, scaled
 
 BANDS = 3
@@ -25,6 +26,8 @@ BANDS = 3
 FEATHER = (0.25, 0.5, 1.0)
 """Of each band, over the overlap of two pieces: the way on which its weight falls to zero."""
 
+SMOOTHER = 8
+"""Of a piece's edge the part that is the σ by which its changing motion is smoothed."""
 Blending = Literal["roots", "shares"]
 Frames = Callable[[int], np.ndarray]
 """Of each clip of the database its frames (T, Y, X) uint8."""
@@ -57,6 +60,27 @@ def differences(of: Nodes, shown: Shown, frames: Frames, shape: tuple[int, int],
         for band, values in enumerate(bands(moves)):
             total[(band, slice(None), *inside)] += share[p][band][part] * values[(slice(None), *part)]
     return Differences(total)
+
+
+def motion_changes(of: Nodes, shown: Shown, frames: Frames, shape: tuple[int, int], cut: Cut, length: int,
+                   seed: int) -> np.ndarray:
+    """What the motion of each frame differs from its mean, M_i - M: (length, Y, X, 2) float32, a loop.
+
+    In pixels per frame. The optical flow of the assigned pieces, at the phases of their differences, blended as their
+    coarsest band is.
+    """
+    import cv2
+
+    total = np.zeros((length, *shape, 2), np.float32)
+    share = weights(of, shape, cut)[:, -1, ..., None]
+    start = phases(of, shown, seed)
+    for p, piece in read(shown, frames, cut):
+        flow = optical_flow(piece.astype(np.uint8))
+        smooth = [cv2.GaussianBlur(frame, (0, 0), cut.size / SMOOTHER) for frame in flow - flow.mean(axis=0)]
+        inside, part = _visible(int(of.corner[p, 0]), int(of.corner[p, 1]), shape, cut)
+        total[(slice(None), *inside)] += share[p][part] * looped(np.stack(smooth), length, int(start[p]))[
+            (slice(None), *part)]
+    return total
 
 
 def read(shown: Shown, frames: Frames, cut: Cut) -> Iterator[tuple[int, np.ndarray]]:

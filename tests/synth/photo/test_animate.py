@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from synth.photo.animate import Look, Target, composed, mattes, motion, over_background
+from synth.photo.animate import Look, Target, composed, matte_displaced, mattes_mixed, motion, over_background
 from synth.photo.assign import Shown, Wanted, nodes
 from synth.photo.index import CELLS
 from synth.photo.integrate import Differences, bands
@@ -91,10 +91,12 @@ def test_a_matte_moves_with_the_fluid_it_cuts_out():
     y, x = np.mgrid[:SHAPE[0], :SHAPE[1]]
     rising = np.stack([np.uint8(128 + 60 * np.sin((y - 2 * k) / 24 * 2 * np.pi) * np.cos(x / 5)) for k in range(12)])
     one = target()
-    found = mattes(one, rising, 0.8)
+    found = mattes_mixed(one, rising, 0.8)
     assert np.abs(np.diff(found, axis=0)).max() > 1e-3
     np.testing.assert_allclose(found.sum(axis=(1, 2)), one.matte.sum(), rtol=1e-2)
-    assert (mattes(one, rising, 0.0) == one.matte).all()
+    by = np.broadcast_to(np.float32([3, 1]), (*SHAPE, 2)).copy()
+    assert matte_displaced(one, by).sum() == pytest.approx(one.matte.sum(), rel=1e-2)
+    np.testing.assert_allclose(matte_displaced(one, 0 * by), one.matte, atol=1e-3)
 
 
 @pytest.mark.parametrize("wrong", [{"carried": 1.1}, {"carried": -0.1}, {"strength": -1.0}])
