@@ -91,7 +91,7 @@ seed = {seed}
 [photo]
 file = "assets/stream/image.jpg"
 matte = "assets/stream/mask.png"
-strokes = [[[745, 340], [742, 376]], [[520, 660], [580, 690]]]
+strokes = [[[490, 28], [487, 64]], [[265, 348], [325, 378]]]
 width = {width}
 [clips]
 count = {count}

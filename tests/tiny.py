@@ -185,7 +185,7 @@ frames = 8
 [photo]
 file = "assets/stream/image.jpg"
 matte = "assets/stream/mask.png"
-strokes = [[[745, 340], [742, 376]], [[560, 600], [500, 640]]]
+strokes = [[[490, 28], [487, 64]], [[305, 288], [245, 328]]]
 width = 96
 [clips]
 count = 1

@@ -79,7 +79,7 @@ MAKES: dict[str, Any] = {"fire": make_fire, "smoke": make_smoke, "painting": mak
 def made_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     """The made target of a scene that asks for one: picture and background (h, w, 3), linear light, matte (h, w) and
     motion (h, w, 2), pixels per frame, to the right and upwards; top row first. Kept once for all scenes."""
-    if scene.photo.made is None:
+    if not scene.photo.made:
         return ()
     return (Artifact("made", "synth", arrays.ARRAYS, ("photo.made", "photo.width", "seed"), (), MAKES[scene.photo.made],
                      animated=False, shared=True),)

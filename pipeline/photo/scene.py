@@ -57,7 +57,7 @@ def photo_fits(scene: Scene) -> Faults:
 def _target_fits(scene: Scene) -> Faults:
     """A file with its matte, or a made picture without files in their place."""
     photo = scene.photo
-    if photo.made is None:
+    if not photo.made:
         for name, file in (("file", photo.file), ("matte", photo.matte)):
             if file is None:
                 yield f"photo.{name}", "is missing, and so is photo.made"

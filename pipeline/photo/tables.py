@@ -20,9 +20,10 @@ class Photo(Table):
     """The photograph or painting, and what the user says of it."""
 
     file: Asset | None = key("the picture: JPEG, PNG, TIFF; none: `made` says it", None)
-    made: Literal["fire", "smoke", "painting"] | None = key(
+    made: Literal["", "fire", "smoke", "painting"] = key(
         "in place of a file, a target that is made, with its matte, its background and, unless the scene gives them, "
-        "its strokes: a bonfire, the smoke of a stack, a painting of a waterfall; it counts as 640 x 480 pixels", None)
+        "its strokes: a bonfire, the smoke of a stack, a painting of a waterfall; it counts as 640 x 480 pixels; "
+        "\"\": photo.file", "")
     matte: Asset | None = key("of a file: a grey picture of the same size, white where the fluid is (§3)", None)
     frozen: Asset | None = key("a grey picture of the same size: white where something stands still in the fluid, "
                                "as stones and ledges do; none: nothing", None)
@@ -64,7 +65,7 @@ class Assignment(Table):
                      ge=16, le=256, multiple_of=16)
     candidates: int = key("of each piece of the picture", 100, ge=1, le=1000)
     sigma: float = key("σ of Eq. 2: motion that changes, over its mean", 0.7, ge=0, le=1000)
-    rho: float = key("ρ of Eq. 6: textureness over motion", 0.5, ge=0, le=1000)
+    rho: float = key("ρ of Eq. 6: textureness over motion", 0.5, ge=0, le=100000)
     weight: float = key("λ of Eq. 4: neighbours over likeness", 0.15, ge=0, le=1000)
     texture: float = key("weight of the difference of textureness in Eq. 5", 0.35, ge=0, le=100)
     brightness: float = key("weight of the difference of brightness in Eq. 5", 0.5, ge=0, le=100)

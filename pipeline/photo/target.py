@@ -37,7 +37,7 @@ def read_target(scene: PhotoScene, made: arrays.Arrays | None = None) -> Any:
 
 def target_inputs(scene: PhotoScene) -> tuple[str, ...]:
     """The artifacts that `target_of` reads."""
-    return () if scene.photo.made is None else ("made",)
+    return () if not scene.photo.made else ("made",)
 
 
 def target_of(scene: PhotoScene, inputs: Inputs) -> Any:
@@ -143,7 +143,7 @@ def _speed_map(scene: PhotoScene, size: tuple[int, int]) -> np.ndarray | None:
 
 def read_strokes(scene: PhotoScene) -> list[np.ndarray]:
     """The strokes, each (K, 2) float64: x, y in pixels of the output, whose lowest left pixel is 0, 0."""
-    if scene.photo.made is not None:
+    if scene.photo.made:
         return _strokes(scene, SHAPE)
     rows, columns = pictures.read_foreign(Path(scene.photo.file or ""), "photo.file").shape[:2]
     return _strokes(scene, (rows, columns))
@@ -158,7 +158,7 @@ def _strokes(scene: PhotoScene, shape: tuple[int, int]) -> list[np.ndarray]:
     scale = photo.width / shape[1]
     height = max(1, round(shape[0] * scale))
     strokes = []
-    for number, stroke in enumerate(photo.strokes or STROKES.get(photo.made or "", ())):
+    for number, stroke in enumerate(photo.strokes or STROKES.get(photo.made, ())):
         points = np.array(stroke, np.float64)
         if ((points < -0.5) | (points > np.array(shape[::-1]) - 0.5)).any():
             raise InvalidValue(f"photo.strokes[{number}]", f"leaves the picture of {shape[1]} x {shape[0]} pixels")
@@ -171,7 +171,7 @@ def _strokes(scene: PhotoScene, shape: tuple[int, int]) -> list[np.ndarray]:
 
 def check_target(scene: PhotoScene) -> None:
     """Refuses a target before anything is made; of a made one what the scene says of it."""
-    if scene.photo.made is None:
+    if not scene.photo.made:
         read_target(scene)
     else:
         _wanted(scene, SHAPE, _frozen(scene, SHAPE))

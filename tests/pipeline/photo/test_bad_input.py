@@ -22,7 +22,7 @@ from pipeline.photo.target import read_target
 SCENE = PHOTO
 for old, new in (("assets/stream/image.jpg", "a.png"), ("assets/stream/mask.png", "m.png"),
                  ("width = 96", "width = 64"),
-                 ("[[[745, 340], [742, 376]], [[560, 600], [500, 640]]]", "[[[20, 10], [20, 50]]]")):
+                 ("[[[490, 28], [487, 64]], [[305, 288], [245, 328]]]", "[[[20, 10], [20, 50]]]")):
     SCENE = changed(SCENE, old, new)
 OWN = changed(SCENE, "count = 1", 'count = 0\nfiles = ["c.mp4"]')
 SHAPE = (60, 120)

@@ -55,6 +55,6 @@ def test_the_readmes_example_is_a_whole_scene(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("panel", ["strokes", "orientation"])
 def test_panels_of_strokes_need_strokes(tmp_path: Path, panel: str) -> None:
-    text = changed(PHOTO, "strokes = [[[745, 340], [742, 376]], [[560, 600], [500, 640]]]\n", "")
+    text = changed(PHOTO, "strokes = [[[490, 28], [487, 64]], [[305, 288], [245, 328]]]\n", "")
     assert complaint(written(tmp_path, changed(text, '["target"', f'["{panel}"'))) == (
         f'photo.strokes: is empty, and the panel "{panel}" shows the strokes')

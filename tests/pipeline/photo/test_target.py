@@ -14,7 +14,7 @@ from pipeline.files import pictures
 from pipeline.photo.target import check_target, read_strokes, read_target
 
 OWN = PHOTO.replace("assets/stream/image.jpg", "a.png").replace("assets/stream/mask.png", "m.png").replace(
-    "[[[745, 340], [742, 376]], [[560, 600], [500, 640]]]", "[[[20, 10], [20, 50]]]")
+    "[[[490, 28], [487, 64]], [[305, 288], [245, 328]]]", "[[[20, 10], [20, 50]]]")
 SHAPE = (60, 120)
 
 
