@@ -37,7 +37,7 @@ from synth.photo.assign import ANGLES, Assigned, Database, Nodes, Settings, Show
 from synth.photo.clips import clip
 from synth.photo.fit import fitted
 from synth.photo.index import Index, exposures, index
-from synth.photo.integrate import Blending, Frames, differences
+from synth.photo.integrate import Blending, Differences, Frames, differences
 from synth.photo.pieces import Cut
 from synth.photo.words import codebook, descriptors
 
@@ -142,11 +142,14 @@ def animated(target: Target, of_clips: Stock, variant: Variant) -> Animated:
     more, integrating = timed(lambda: differences(of, shown, of_clips.frames, target.matte.shape, CUT, FRAMES, SEED,
                                                   variant.blending))
     moves = motion(target, of, shown, CUT)
-    frames, composing = timed(lambda: np.stack([
-        over_background(target, picture, target.matte).mean(axis=2)
-        for picture in composed(target, more, moves, variant.look, SEED)]))
+    frames, composing = timed(lambda: _composed(target, more, moves, variant.look))
     return Animated(of, found, frames, {"assignment": assigning["wall"], "integration": integrating["wall"],
                                         "composition": composing["wall"]})
+
+
+def _composed(target: Target, more: Differences, moves: np.ndarray, look: Look) -> np.ndarray:
+    shown_at = composed(target, more, moves, look, SEED)
+    return np.stack([over_background(target, shown_at(frame), target.matte).mean(axis=2) for frame in range(FRAMES)])
 
 
 def _assigned(target: Target, of_clips: Stock, settings: Settings) -> tuple[Nodes, Assigned, Shown]:

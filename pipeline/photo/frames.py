@@ -123,13 +123,12 @@ def make_fluid(scene: PhotoScene, inputs: Inputs, frames: list[int], clips: list
     by = inputs.read("displacement")["by"] if "displacement" in inputs else None
     look = Look(scene.photo.carried, scene.photo.feature, scene.photo.strength, scene.photo.matching)
     whole, moves = target.picture.copy(), inputs.read("assignment")["motion"][box]
-    for frame, picture in enumerate(composed(part, more, moves, look, scene.seed), start=1):
-        if frame in frames:
-            shape = picture if by is None else displaced(picture, by[frame - 1].astype(np.float32))
-            whole[box] = np.clip(shape, 0, 1)
-            yield frame, tonemap.from_srgb(whole)[::-1].astype(np.float32)
-        if frame == frames[-1]:
-            break
+    shown_at = composed(part, more, moves, look, scene.seed)
+    for frame in frames:
+        picture = shown_at(frame - 1)
+        shape = picture if by is None else displaced(picture, by[frame - 1].astype(np.float32))
+        whole[box] = np.clip(shape, 0, 1)
+        yield frame, tonemap.from_srgb(whole)[::-1].astype(np.float32)
 
 
 def _display(inputs: Inputs, frame: int) -> np.ndarray:

@@ -8,15 +8,14 @@ and the differences add what the picture does not have.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import repeat
 from typing import Any, Literal
 
 import numpy as np
 
 from synth.photo import photograph
-from synth.photo.appearance import added, average, extended, gains, matched
+from synth.photo.appearance import added, average, evened, evening, extended, gains, matched
 from synth.photo.assign import Nodes, Shown, Wanted
 from synth.photo.boundary import displaced, mixed, with_area
 from synth.photo.integrate import Differences, motion_field
@@ -25,6 +24,8 @@ from synth.photo.pieces import Cut
 
 CALMED = 0.5
 """What of the differences is left, of their full strength, where the photograph is carried in full: it moves itself."""
+SAMPLES = 4
+"""Frames whose bands are measured."""
 REGION = 64
 """Pixels of a region in which histograms are matched."""
 THIN = 0.2
@@ -132,33 +133,46 @@ def motion(target: Target, of: Nodes, shown: Shown, cut: Cut) -> np.ndarray:
     return np.where(target.fluid[..., None] > 0, scaled, 0).astype(np.float32)
 
 
-def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, seed: int) -> Iterator[np.ndarray]:
-    """The fluid of each frame (Y, X, 3) float32, everywhere: §6, "Recovery of Color Appearance", "Appearance Matching".
+def composed(target: Target, more: Differences, moves: np.ndarray, look: Look, seed: int,
+             ) -> Callable[[int], np.ndarray]:
+    """Of a frame 0, 1 … the fluid (Y, X, 3) float32, everywhere: §6, "Recovery of Color Appearance", "Appearance
+    Matching".
 
     moves  the motion (Y, X, 2) as `motion` gives it
 
     1. The ground: the average, and the photograph carried.
     2. The differences, matched to the target.
+    3. Bands of all of it as strong as the target's, by gains over all time.
     """
     length = more.bands.shape[1]
     fluid = target.foreground
     # 1. ground
     still = average(fluid, moves) if look.carried < 1 else fluid
-    moving = (photograph.frames(fluid, moves, length, seed, look.feature, target.shows)
-              if look.carried > 0 else repeat(still, length))
+    moving = photograph.flowing(fluid, moves, length, seed, look.feature, target.shows) if look.carried > 0 else None
     grey = fluid.mean(axis=2)
     strength = look.strength * (1 - look.carried * (1 - CALMED))
     # 2. differences
     as_they_are = look.matching in ("none", "regions")
     scale = (np.full_like(more.bands[:, 0], 1 / 255) if as_they_are else gains(grey, more.bands, target.fluid))
-    for frame, moved in enumerate(moving):
-        ground = (1 - look.carried) * still + look.carried * moved
+
+    def mixed_in(frame: int) -> np.ndarray:
+        ground = still if moving is None else (1 - look.carried) * still + look.carried * moving(frame)
         change = (scale * more.bands[:, frame]).sum(axis=0) * strength
-        shown = np.clip(ground + change[..., None], 0, 1) if look.matching == "regions" else added(ground, change)
-        if look.matching in ("histograms", "regions"):
-            wanted = matched(shown.mean(axis=2), grey, target.fluid, REGION, look.matching == "histograms")
-            shown = added(shown, wanted - shown.mean(axis=2))
-        yield shown
+        return np.clip(ground + change[..., None], 0, 1) if look.matching == "regions" else added(ground, change)
+
+    def matched_to_target(frame: int) -> np.ndarray:
+        shown = mixed_in(frame)
+        wanted = matched(shown.mean(axis=2), grey, target.fluid, REGION, look.matching == "histograms")
+        return added(shown, wanted - shown.mean(axis=2))
+
+    if look.matching == "none":
+        return mixed_in
+    if look.matching in ("histograms", "regions"):
+        return matched_to_target
+    # 3. bands
+    samples = [mixed_in(length * k // SAMPLES).mean(axis=2) for k in range(SAMPLES)]
+    even = evening(samples, grey, target.fluid)
+    return lambda frame: evened(mixed_in(frame), even)
 
 
 def mattes_mixed(target: Target, fluid: np.ndarray, dynamics: float) -> np.ndarray:

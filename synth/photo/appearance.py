@@ -10,6 +10,8 @@ Pictures are (Y, X[, 3]) float32, display-encoded, 0..1.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import ndimage
 
@@ -28,6 +30,9 @@ COARSEST = 0.4
 """Of its gain, the coarsest band's: there, differences are blotches as large as a piece."""
 ROOM = 0.12
 """The least a (1 - a) by which differences are scaled: a logit knows no black and no white."""
+OCTAVES = 3
+EVENED = 1.4
+"""The most by which an octave of a frame is strengthened, or weakened."""
 NOISE = 0.004
 """Deviation below which a target has no detail: its own noise is not animated."""
 
@@ -107,6 +112,37 @@ def added(ground: np.ndarray, more: np.ndarray) -> np.ndarray:
     changed = 1 / (1 + np.exp(-(np.log(grey / (1 - grey)) + more / room)))
     coloured = np.clip(ground, 1e-4, 1) ** (np.log(changed) / np.log(grey))[..., None]
     return np.clip(coloured * (changed / coloured.mean(axis=-1))[..., None], 0, 1).astype(np.float32)
+
+
+def evening(frames: Sequence[np.ndarray], target: np.ndarray, fluid: np.ndarray) -> np.ndarray:
+    """Gains (OCTAVES,) float64 that give frames, each (Y, X), the deviation of the target's octaves, where the fluid
+    (Y, X) is: within EVENED of 1."""
+    inside = fluid > 0.5
+
+    def deviations(picture: np.ndarray) -> np.ndarray:
+        return np.array([band[inside].std(dtype=np.float64) for band in octaves(picture)])
+
+    ours = np.mean([deviations(frame) for frame in frames], axis=0)
+    return np.clip(deviations(target) / np.maximum(ours, 1e-6), 1 / EVENED, EVENED)
+
+
+def evened(picture: np.ndarray, gain: np.ndarray) -> np.ndarray:
+    """A picture (Y, X, C) with the octaves of its grey level scaled by gains (OCTAVES,): float32."""
+    bands_ = octaves(picture.mean(axis=2))
+    return added(picture, np.sum([(g - 1) * band for g, band in zip(gain, bands_, strict=True)], axis=0))
+
+
+def octaves(picture: np.ndarray) -> list[np.ndarray]:
+    """Differences of Gaussians of σ 0, 1, 2, 4 of a picture (Y, X): OCTAVES of (Y, X) float32, without what is left."""
+    import cv2
+
+    found, before = [], np.ascontiguousarray(picture, np.float32)
+    for octave in range(OCTAVES):
+        sigma = 1.0 if octave == 0 else np.sqrt(3.0) * 2 ** (octave - 1)
+        after = cv2.GaussianBlur(before, (0, 0), sigma, borderType=cv2.BORDER_REFLECT)
+        found.append(before - after)
+        before = after
+    return found
 
 
 def matched(frame: np.ndarray, target: np.ndarray, matte: np.ndarray, region: int, overlapping: bool = True,

@@ -27,6 +27,8 @@ from synth.photo.words import TOTAL, common
 
 ANGLES = (45.0, 60.0, 90.0, 180.0)
 """Degrees between the wanted and a piece's motion: the first that leaves enough candidates."""
+PARTED = 8
+"""Of a small database one in so many pieces that move as wanted are enough."""
 FASTER = 2.0
 """A piece may be so many times as fast or slow as wanted; twice as many, with each wider angle."""
 PART = 0.02
@@ -239,7 +241,7 @@ def _candidates(target: _Target, wanted: Wanted, database: Database, settings: S
     piece, exposure = (np.zeros((len(target.brightness), limit), np.int64) for _ in range(2))
     data, angle = np.full(piece.shape, np.inf), np.zeros(len(piece))
     for p in range(len(piece)):
-        allowed, angle[p] = _allowed(mean, _of_node(wanted, p), limit)
+        allowed, angle[p] = _allowed(mean, _of_node(wanted, p), min(limit, max(1, count // PARTED)))
         if settings.energy == "printed":
             # candidates are chosen "based on their similar appearance"; of them, Eq. 5 prefers the least similar
             order = np.argsort(-similar[p, allowed, 0].astype(np.int64), kind="stable")[:limit]

@@ -18,7 +18,7 @@ Hot: `carried`, 16 pixels for each of up to four copies of each pixel of each fr
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -213,16 +213,17 @@ def starts(lived: np.ndarray, length: int, seed: int) -> np.ndarray:
     return np.stack([away * np.cos(angle), away * np.sin(angle)], axis=-1).astype(np.float32)
 
 
-def frames(picture: np.ndarray, motion: np.ndarray, length: int, seed: int, feature: float, fluid: np.ndarray,
-           ) -> Iterator[np.ndarray]:
-    """The `length` frames of a picture (Y, X, 3) float32 carried along motion (Y, X, 2), a loop: (Y, X, 3) float32.
+def flowing(picture: np.ndarray, motion: np.ndarray, length: int, seed: int, feature: float, fluid: np.ndarray,
+            ) -> Callable[[int], np.ndarray]:
+    """A picture (Y, X, 3) float32 carried along motion (Y, X, 2): of a frame 0 … `length` - 1 of a loop the picture
+    (Y, X, 3) float32.
 
     feature  size of what moves, as streaks, ripples and billows, pixels: what is larger stands
     fluid    (Y, X) bool: where the fluid is; nothing is read from the rest
 
     1. What stands and what moves.
     2. Where each pixel was; when its life begins, how long it is, where detail begins.
-    3. Frame by frame the carried detail, on what stands.
+    3. The carried detail of a frame, on what stands.
     """
     # 1. split
     of = split(picture, motion, feature, fluid)
@@ -239,8 +240,7 @@ def frames(picture: np.ndarray, motion: np.ndarray, length: int, seed: int, feat
     device = carry.on_device()
     scale = _restored(of, [carried(device, length * k // SAMPLES) for k in range(SAMPLES)], feature)[..., None]
     # 3. frames
-    for frame in range(length):
-        yield of.ground + scale * carried(device, frame)
+    return lambda frame: of.ground + scale * carried(device, frame)
 
 
 def _restored(of: Split, moved: list[np.ndarray], feature: float) -> np.ndarray:

@@ -64,11 +64,16 @@ def test_what_is_frozen_does_not_move_and_is_the_pictures():
     assert frame[30, 40].min() > 0.99
 
 
+def composed_all(one, look):
+    shown_at = composed(one, differences(), moves(), look, 3)
+    return np.stack([shown_at(frame) for frame in range(FRAMES)])
+
+
 @pytest.mark.parametrize("look", [Look(), Look(carried=0), Look(carried=1, strength=0), Look(carried=0,
                                   matching="histograms"), Look(matching="none")])
 def test_frames_keep_the_pictures_mean_and_move(look):
     one = target()
-    frames = np.stack(list(composed(one, differences(), moves(), look, 3)))
+    frames = composed_all(one, look)
     assert frames.shape == (FRAMES, *SHAPE, 3)
     assert frames.min() >= 0 and frames.max() <= 1
     inside = np.s_[:, 14:34, 14:50]
@@ -80,7 +85,7 @@ def test_frames_keep_the_pictures_mean_and_move(look):
 
 def test_more_strength_moves_more():
     def change(strength):
-        frames = np.stack(list(composed(target(), differences(), moves(), Look(carried=0, strength=strength), 3)))
+        frames = composed_all(target(), Look(carried=0, strength=strength))
         return np.abs(np.diff(frames, axis=0))[:, 14:34, 14:50].mean()
 
     assert change(0.0) < 1e-6

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from synth.photo.appearance import added, average, extended, gains, matched
+from synth.photo.appearance import EVENED, added, average, evened, evening, extended, gains, matched, octaves
 from synth.photo.integrate import bands
 
 SHAPE = (80, 96)
@@ -99,6 +99,17 @@ def test_a_matched_frame_has_the_targets_values_and_no_lattice():
     step = np.abs(np.diff(found, axis=1))
     lines = step[:, 15::16].mean() / np.delete(step, np.s_[15::16], axis=1).mean()
     assert lines == pytest.approx(1, abs=0.1)
+
+
+@pytest.mark.parametrize(("factor", "gain"), [(0.8, 1.25), (1.1, 1 / 1.1), (0.1, EVENED)])
+def test_bands_of_frames_get_the_targets_strength(factor, gain):
+    target = 0.5 + 0.05 * grain(4)
+    frame = (0.5 + factor * 0.05 * grain(5)).astype(np.float32)
+    found = evening([frame], target, np.ones(SHAPE))
+    np.testing.assert_allclose(found, gain, rtol=0.1)
+    shown = evened(frame[..., None].repeat(3, axis=2), found)[..., 0]
+    for ours, before in zip(octaves(shown), octaves(frame), strict=True):
+        assert ours.std() / before.std() == pytest.approx(gain, rel=0.15)
 
 
 def test_regions_side_by_side_show_a_lattice():

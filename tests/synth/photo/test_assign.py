@@ -96,6 +96,13 @@ def test_a_direction_that_no_clip_has_is_widened_and_said(database):
     assert np.isfinite(found.energies).all()
 
 
+def test_a_small_database_keeps_the_direction_with_fewer_candidates(database):
+    """As many candidates as there are pieces: those of the other clips flow elsewhere."""
+    orientation = np.broadcast_to(np.float32([1.0, 0.0]), (*SHAPE, 2))
+    _, found = assign(CLIPS[0][0][0], full(), database, CUT, Wanted(orientation), replace(FEW, candidates=1000))
+    assert (found.angle == 45).all()
+
+
 def test_the_wanted_speed_is_kept(database):
     slow = np.full(SHAPE, 0.75, np.float32)
     _, found = assign(CLIPS[0][0][0], full(), database, CUT, Wanted(None, slow), FEW)

@@ -11,7 +11,7 @@ from synth.photo.photograph import (
     Carrying,
     carried,
     carried_reference,
-    frames,
+    flowing,
     lives,
     mirrored,
     paths,
@@ -25,7 +25,8 @@ SHAPE = (72, 96)
 
 
 def moving(of, motion, length, seed, feature=10.0, fluid=None):
-    return np.stack(list(frames(of, motion, length, seed, feature, np.ones(SHAPE, bool) if fluid is None else fluid)))
+    shown_at = flowing(of, motion, length, seed, feature, np.ones(SHAPE, bool) if fluid is None else fluid)
+    return np.stack([shown_at(frame) for frame in range(length)])
 
 
 def picture(seed=1, sigma=1.5):
