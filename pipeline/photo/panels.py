@@ -18,7 +18,7 @@ MOVING = {"result": ("frames", "frame"), "matte": ("mattes", "matte of frame")}
 
 
 def panels(scene: PhotoScene) -> tuple[Panel, ...]:
-    """The panels of the scene's figure; with moments, in the still one result and one matte for each."""
+    """The panels of the scene's figure; with moments, in the still one result for each, and one matte if it moves."""
     full = scene.figure.panel
     made: list[Panel] = []
     for shown in _shown(scene):
@@ -27,10 +27,11 @@ def panels(scene: PhotoScene) -> tuple[Panel, ...]:
                               border=shown.border))
             continue
         artifact, name = MOVING[shown]
-        for moment in scene.figure.moments:
+        # a matte that stands is shown once
+        moments = () if shown == "matte" and scene.photo.dynamics == 0 else scene.figure.moments
+        for moment in moments:
             made.append(Panel(f"{name} {moment}", artifact, full, "straight", frame=moment, shown_in="still"))
-        made.append(Panel(shown, artifact, full, "straight",
-                          shown_in="animation" if scene.figure.moments else "both"))
+        made.append(Panel(shown, artifact, full, "straight", shown_in="animation" if moments else "both"))
     return tuple(made)
 
 

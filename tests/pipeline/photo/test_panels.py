@@ -14,12 +14,15 @@ def test_each_name_is_its_artifact(tmp_path: Path) -> None:
         ("result", "frames", False)]
 
 
-def test_with_moments_the_still_has_one_result_and_one_matte_for_each(tmp_path: Path) -> None:
-    found = panels(scene(tmp_path, changed(PHOTO, "panel = 32", "panel = 32\nmoments = [1, 3]")))
-    assert [(p.label, p.frame, p.shown_in) for p in found] == [
+def test_with_moments_the_still_has_one_result_for_each_and_one_matte_if_it_moves(tmp_path: Path) -> None:
+    text = changed(PHOTO, "panel = 32", "panel = 32\nmoments = [1, 3]")
+    frames = [("motion", 0, "both"), ("frame 1", 1, "still"), ("frame 3", 3, "still"), ("result", 0, "animation")]
+    assert [(p.label, p.frame, p.shown_in) for p in panels(scene(tmp_path, text))] == [
+        ("target", 0, "both"), ("matte", 0, "both"), *frames]
+    moving = changed(text, "width = 96", "width = 96\ndynamics = 0.5")
+    assert [(p.label, p.frame, p.shown_in) for p in panels(scene(tmp_path, moving))] == [
         ("target", 0, "both"), ("matte of frame 1", 1, "still"), ("matte of frame 3", 3, "still"),
-        ("matte", 0, "animation"), ("motion", 0, "both"),
-        ("frame 1", 1, "still"), ("frame 3", 3, "still"), ("result", 0, "animation")]
+        ("matte", 0, "animation"), *frames]
 
 
 PIECES = changed(PHOTO, '["target", "matte", "motion", "result"]\npanel = 32',
