@@ -110,7 +110,8 @@ def added(ground: np.ndarray, more: np.ndarray) -> np.ndarray:
     grey = np.clip(ground.mean(axis=-1), 1e-4, 1 - 1e-4)
     room = np.maximum(grey * (1 - grey), ROOM)
     changed = 1 / (1 + np.exp(-(np.log(grey / (1 - grey)) + more / room)))
-    coloured = np.clip(ground, 1e-4, 1) ** (np.log(changed) / np.log(grey))[..., None]
+    # half way between colours of one hue and those of one gamma
+    coloured = np.clip(ground, 1e-4, 1) ** np.sqrt(np.log(changed) / np.log(grey))[..., None]
     return np.clip(coloured * (changed / coloured.mean(axis=-1))[..., None], 0, 1).astype(np.float32)
 
 
