@@ -101,18 +101,23 @@ def _local(values: np.ndarray, matte: np.ndarray) -> np.ndarray:
     return np.asarray(sums / np.maximum(share, 1e-6))
 
 
+def greys(picture: np.ndarray) -> np.ndarray:
+    """The grey level of colours (..., 3): their mean. A reduction over so few takes NumPy five times as long."""
+    return np.asarray((picture[..., 0] + picture[..., 1] + picture[..., 2]) / 3)
+
+
 def added(ground: np.ndarray, more: np.ndarray) -> np.ndarray:
-    """Pictures ground (..., C) with `more` (...,), a change of the grey level, added where there is room: float32.
+    """Pictures ground (..., 3) with `more` (...,), a change of the grey level, added where there is room: float32.
 
     In the logit of the grey level, and so never below 0 or above 1. Colours by one power each: what becomes darker
     becomes deeper, as flames do, and what becomes brighter whiter, as foam does.
     """
-    grey = np.clip(ground.mean(axis=-1), 1e-4, 1 - 1e-4)
+    grey = np.clip(greys(ground), 1e-4, 1 - 1e-4)
     room = np.maximum(grey * (1 - grey), ROOM)
     changed = 1 / (1 + np.exp(-(np.log(grey / (1 - grey)) + more / room)))
     # half way between colours of one hue and those of one gamma
     coloured = np.clip(ground, 1e-4, 1) ** np.sqrt(np.log(changed) / np.log(grey))[..., None]
-    return np.clip(coloured * (changed / coloured.mean(axis=-1))[..., None], 0, 1).astype(np.float32)
+    return np.clip(coloured * (changed / greys(coloured))[..., None], 0, 1).astype(np.float32)
 
 
 def evening(frames: Sequence[np.ndarray], target: np.ndarray, fluid: np.ndarray) -> np.ndarray:
@@ -129,7 +134,7 @@ def evening(frames: Sequence[np.ndarray], target: np.ndarray, fluid: np.ndarray)
 
 def evened(picture: np.ndarray, gain: np.ndarray) -> np.ndarray:
     """A picture (Y, X, C) with the octaves of its grey level scaled by gains (OCTAVES,): float32."""
-    bands_ = octaves(picture.mean(axis=2))
+    bands_ = octaves(greys(picture))
     return added(picture, np.sum([(g - 1) * band for g, band in zip(gain, bands_, strict=True)], axis=0))
 
 
