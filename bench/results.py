@@ -35,7 +35,7 @@ TITLES = {
     "fidelity": "ma13: statistics of every scene beside those of its exemplar",
     "texture": "wang05: how like their sample moving textures stay, how they move, time, memory",
     "loops": "wang05: loops of 120 frames, 512² from 128²",
-    "photo": "okabe11: look, motion, loop and truth on targets of no tuning, minimizers, time, memory",
+    "photo": "okabe11: look, motion, loop and truth on targets it was not tuned on, minimizers, time, memory",
 }
 PARTS = tuple(TITLES)  # measured by `python -m bench PART`
 SECTIONS = (*PARTS, "figures", "earlier")  # the last two are written by hand

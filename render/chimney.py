@@ -156,7 +156,7 @@ def _works() -> tuple[studio.Mesh, np.ndarray]:
     ridge = -0.265 + 0.085 * np.where(tooth < 0.12, tooth / 0.12, (1 - tooth) / 0.88)
     rows = np.concatenate([[-1.0], np.linspace(-0.6, 0, 120)])
     y = np.where(rows[:, None] < -0.9, -0.9, ridge[None] + 0.12 * rows[:, None])
-    z = np.broadcast_to(np.where(rows < -0.9, 0.3, 0.3)[:, None], y.shape)
+    z = np.full(y.shape, 0.3)
     xx = np.broadcast_to(x, y.shape)
     mesh = studio.Mesh(np.stack([xx, y, z], -1).reshape(-1, 3).astype(np.float32), studio.grid_faces(*y.shape))
     return mesh, _bricks(mesh.vertices[:, 0] / 0.028, mesh.vertices[:, 1] / 0.0095, 41) * 0.7

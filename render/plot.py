@@ -1,4 +1,4 @@
-"""Curves over axes, as papers print them: for panels that show numbers (okabe11 figs. 6, 7 and 9)."""
+"""Curves over axes, as papers print them: for panels that show numbers (okabe11 figs. 6 and 9)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ RULE = 0.90
 
 
 class Curve(NamedTuple):
-    """x and y (N,) of a curve, its colour, and its name at its right end; "" for none."""
+    """x and y (N,) of a curve, its colour, and its name, listed in the upper right corner; "" for none."""
 
     x: np.ndarray
     y: np.ndarray

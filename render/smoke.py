@@ -198,7 +198,7 @@ def volume(density: np.ndarray, voxel_size: float, origin: tuple[float, float, f
     mi = backend.mitsuba("scalar_rgb")
     scene = _studio(mi, settings.bowl)
     if density.any():
-        scene["smoke"] = medium(mi, density, voxel_size, origin, settings.extinction)
+        scene["smoke"] = medium(mi, density, voxel_size, origin, settings.extinction, SMOKE_ALBEDO)
     light = _photographed(mi, scene, settings)
     if not settings.denoised:
         return light
@@ -229,7 +229,7 @@ def alone(density: np.ndarray, voxel_size: float, origin: tuple[float, float, fl
     mi = backend.mitsuba("scalar_rgb")
     scene = _studio(mi, None)
     del scene["backdrop"]
-    scene["smoke"] = medium(mi, checked_density(density, 3), voxel_size, origin, settings.extinction)
+    scene["smoke"] = medium(mi, checked_density(density, 3), voxel_size, origin, settings.extinction, SMOKE_ALBEDO)
     return _photographed(mi, scene, settings)
 
 
@@ -289,7 +289,7 @@ def _photographed(mi: Any, scene: dict[str, Any], settings: VolumeSettings) -> n
 
 
 def medium(mi: Any, density: np.ndarray, voxel_size: float, origin: tuple[float, float, float],
-           extinction: float, albedo: tuple[float, float, float] = SMOKE_ALBEDO) -> dict[str, Any]:
+           extinction: float, albedo: tuple[float, float, float]) -> dict[str, Any]:
     """The smoke as a Mitsuba shape: a box without a surface, cropped to `active_box`."""
     box = active_box(density)
     cells = np.array([s.stop - s.start for s in box[::-1]], np.float64)  # x, y, z

@@ -5,6 +5,7 @@ Pictures are in linear light, top row first; synth.photo has display values, the
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -15,7 +16,7 @@ from pipeline.errors import attributed_to
 from pipeline.files import arrays, images
 from pipeline.photo.clips import names
 from pipeline.photo.tables import PhotoScene
-from pipeline.photo.target import check_target, target_inputs, target_of
+from pipeline.photo.target import check_target, flowing_size, target_inputs, target_of
 
 
 def cut_of(scene: PhotoScene) -> Any:
@@ -35,15 +36,21 @@ def _database(inputs: Inputs, index: list[str]) -> Any:
 
 
 def frames_of(inputs: Inputs, clips: list[str]) -> Callable[[int], np.ndarray]:
-    """The frames of each clip, read when they are wanted."""
-    read: dict[int, np.ndarray] = {}
-
+    """The frames of each clip, read when they are wanted; the last is kept."""
+    @functools.lru_cache(maxsize=1)
     def luma(number: int) -> np.ndarray:
-        if number not in read:
-            read[number] = inputs.read(clips[number])["luma"]
-        return read[number]
+        return np.asarray(inputs.read(clips[number])["luma"])
 
     return luma
+
+
+def frames_memory(scene: PhotoScene) -> tuple[float, str]:
+    """Bytes that `make_fluid`, `make_displacement` and `make_mattes` take at most: of each pixel of each frame the
+    bands of differences, the motion, and what is made of them."""
+    from synth.photo.integrate import BANDS
+
+    rows, columns = flowing_size(scene)
+    return rows * columns * scene.frames * 4 * (BANDS + 6.0), "frames" if scene.frames > columns else "photo.width"
 
 
 def make_assignment(scene: PhotoScene, inputs: Inputs, frames: list[int], index: list[str], clips: list[str],
@@ -191,12 +198,14 @@ def frame_artifacts(scene: PhotoScene) -> tuple[Artifact, ...]:
     if displaced:
         made.append(Artifact(
             "displacement", "synth", arrays.ARRAYS, ("photo", "assignment.piece", "frames", "seed"),
-            (*target, ("assignment", "once"), *all_clips), make_displacement, {"clips": clips}, animated=False))
+            (*target, ("assignment", "once"), *all_clips), make_displacement, {"clips": clips}, animated=False,
+            memory=frames_memory))
     shape: Needs = moves or ((("fluid", "every"),) if scene.photo.dynamics > 0 else ())
     return (
         *made,
         Artifact("fluid", "synth", images.LIGHT, ("photo", "assignment.piece", "frames", "seed"),
-                 (*target, *moves, ("assignment", "once"), *all_clips), make_fluid, {"clips": clips}),
+                 (*target, *moves, ("assignment", "once"), *all_clips), make_fluid, {"clips": clips},
+                 memory=frames_memory),
         Artifact("mattes", "synth", images.LIGHT, ("photo", "assignment.piece", "frames"), (*target, *shape),
                  make_mattes),
         Artifact("frames", "synth", images.LIGHT, ("photo",), (*target, ("fluid", "same"), ("mattes", "same")),

@@ -7,6 +7,7 @@ from typing import get_args
 from pipeline.build.method import Faults
 from pipeline.errors import BadInput
 from pipeline.photo.clips import Clips, names
+from pipeline.photo.made import STROKES
 from pipeline.photo.tables import Assignment, Figure, OfPiece, Photo, PhotoScene
 from pipeline.tables import key
 
@@ -37,8 +38,9 @@ def photo_fits(scene: Scene) -> Faults:
     if scene.clips.count and scene.assignment.piece >= min(scene.clips.size) // 2:
         yield "assignment.piece", (f"pieces of {scene.assignment.piece} pixels do not fit into clips of "
                                    f"{scene.clips.size[0]} x {scene.clips.size[1]} at half their size")
-    if scene.photo.speeds and len(scene.photo.speeds) != len(scene.photo.strokes):
-        yield "photo.speeds", f"has {len(scene.photo.speeds)} speeds, and there are {len(scene.photo.strokes)} strokes"
+    strokes = len(scene.photo.strokes or STROKES.get(scene.photo.made, ()))
+    if scene.photo.speeds and len(scene.photo.speeds) != strokes:
+        yield "photo.speeds", f"has {len(scene.photo.speeds)} speeds, and there are {strokes} strokes"
     if scene.photo.speeds and scene.photo.speed is not None:
         yield "photo.speeds", "and photo.speed both say how fast it flows: leave out one"
     for number, moment in enumerate(scene.figure.moments):

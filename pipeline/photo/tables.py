@@ -100,10 +100,10 @@ class Figure(FigureTable):
         "they follow each other", ("target", "result"), min_length=1)
     moments: Annotated[tuple[Annotated[int, Field(ge=1, le=100000)], ...], Strict(False)] = key(
         "frames at which the still shows result and matte; none: figure.frame alone", (), "frames", max_length=16)
-
     pieces: Annotated[tuple[ClipPiece, ...], Strict(False)] = key(
-        "pieces of clips whose processing is shown (figures 5 to 7), each [clip, x, y]: its clip, as \"fall-01\" or "
-        "\"own-01\", and its middle, from the upper left corner", (), "widths and heights of the clip", max_length=8)
+        "pieces of clips whose processing is shown (figures 5 to 7), each [clip, x, y]: its clip, as \"fall-01\", "
+        "\"own-01\" or \"library-pond\", and its middle, from the upper left corner", (),
+        "widths and heights of the clip", max_length=8)
     place: ScenePlace = key(
         "x and y from the upper left corner: the two neighbours beside each other nearest to it are shown (figure 9)",
         (0.5, 0.5), "widths and heights of the picture")

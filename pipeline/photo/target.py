@@ -141,12 +141,27 @@ def _speed_map(scene: PhotoScene, size: tuple[int, int]) -> np.ndarray | None:
     return np.ascontiguousarray(scene.photo.fastest * np.clip(grey, 0, 1)[::-1], np.float32)
 
 
+def flowing_size(scene: PhotoScene) -> tuple[int, int]:
+    """Rows and columns of the part round the matte that is made to flow, pixels of the output, without reading more."""
+    photo = scene.photo
+    if photo.made:
+        return photo.width * SHAPE[0] // SHAPE[1], photo.width
+    matte = pictures.read_scaled(Path(photo.matte or ""), "photo.matte", photo.width, 0.0, LARGEST, "triangle").picture
+    filled = matte.max(axis=2) > 0
+
+    def length(axis: int) -> int:
+        at = np.flatnonzero(filled.any(axis=1 - axis))
+        return int(min(np.ptp(at) + 1 + 2 * scene.assignment.piece, filled.shape[axis])) if len(at) else 0
+
+    return length(0), length(1)
+
+
 def read_strokes(scene: PhotoScene) -> list[np.ndarray]:
     """The strokes, each (K, 2) float64: x, y in pixels of the output, whose lowest left pixel is 0, 0."""
     if scene.photo.made:
         return _strokes(scene, SHAPE)
-    rows, columns = pictures.read_foreign(Path(scene.photo.file or ""), "photo.file").shape[:2]
-    return _strokes(scene, (rows, columns))
+    file = Path(scene.photo.file or "")
+    return _strokes(scene, pictures.read_scaled(file, "photo.file", scene.photo.width, 1.0, LARGEST).of)
 
 
 def _strokes(scene: PhotoScene, shape: tuple[int, int]) -> list[np.ndarray]:

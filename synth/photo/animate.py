@@ -43,9 +43,8 @@ class Look:
     carried   0..1: the photograph carried along the motion, in place of the blurred average
     feature   size of what moves, as streaks, ripples and billows, pixels: what is larger stands
     strength  of the differences
-    matching  "gains": by the strength of bands, over all time, for fire and smoke; "histograms": frame by frame and
-              region by region, for water; "regions": as in the paper, differences added as they are and regions
-              side by side; "none"
+    matching  "gains": by the strength of bands, over all time; "histograms": frame by frame, in regions that overlap;
+              "regions": as in the paper, differences added as they are, regions side by side; "none"
     """
 
     carried: float = 1.0

@@ -115,8 +115,12 @@ def added(ground: np.ndarray, more: np.ndarray) -> np.ndarray:
     grey = np.clip(greys(ground), 1e-4, 1 - 1e-4)
     room = np.maximum(grey * (1 - grey), ROOM)
     changed = 1 / (1 + np.exp(-(np.log(grey / (1 - grey)) + more / room)))
-    # half way between colours of one hue and those of one gamma
-    coloured = np.clip(ground, 1e-4, 1) ** np.sqrt(np.log(changed) / np.log(grey))[..., None]
+    # foam and dark water keep half of their hue, flames, which are saturated, redden and pale as a whole
+    most = np.maximum(np.maximum(ground[..., 0], ground[..., 1]), ground[..., 2])
+    least = np.minimum(np.minimum(ground[..., 0], ground[..., 1]), ground[..., 2])
+    saturated = np.clip((most - least) / np.maximum(most, 1e-4), 0, 1)
+    power = (np.log(changed) / np.log(grey)) ** (0.5 + 0.5 * saturated)
+    coloured = np.clip(ground, 1e-4, 1) ** power[..., None]
     return np.clip(coloured * (changed / greys(coloured))[..., None], 0, 1).astype(np.float32)
 
 

@@ -268,7 +268,9 @@ def _allowed(mean: np.ndarray, wanted: Wanted, least: int) -> tuple[np.ndarray, 
     for step, degrees in enumerate(ANGLES):
         fits = np.ones(len(mean), bool)
         if wanted.orientation is not None and degrees < 180:
-            fits &= mean @ wanted.orientation >= np.cos(np.radians(degrees)) * speed
+            # not a product of matrices: BLAS rounds by the number of its threads
+            along = mean[:, 0] * wanted.orientation[0] + mean[:, 1] * wanted.orientation[1]
+            fits &= along >= np.cos(np.radians(degrees)) * speed
         if wanted.speed is not None and degrees < 180:
             factor = FASTER * 2**step
             fits &= (speed * factor >= wanted.speed) & (speed <= wanted.speed * factor)

@@ -55,7 +55,7 @@ def test_the_orientation_of_a_clip_s_strokes_is_its_velocity_s(river: subjects.S
 
 def test_a_photograph_keeps_its_strokes_apart_from_its_target() -> None:
     stream = subjects.photograph(96)
-    assert stream.target.picture.shape == (64, 96, 3)
+    assert stream.target.picture.shape == (81, 96, 3)
     assert stream.target.wanted.orientation is None and stream.target.wanted.speed is None
     np.testing.assert_allclose(np.hypot(*np.moveaxis(stream.orientation, -1, 0)), 1, atol=1e-4)
 

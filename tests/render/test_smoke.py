@@ -88,10 +88,10 @@ def test_an_unknown_ink_is_refused() -> None:
 
 
 def alone(density: np.ndarray, voxel: float, origin: tuple[float, float, float], extinction: float,
-          spp: int) -> np.ndarray:
+          spp: int, albedo: float = 0.5) -> np.ndarray:
     """`density` in nothing but a constant light of 1 from all over, 16 x 16 pixels."""
     mi = backend.mitsuba("scalar_rgb")
-    scene = {"sky": {"type": "constant"}, "smoke": smoke.medium(mi, density, voxel, origin, extinction)}
+    scene = {"sky": {"type": "constant"}, "smoke": smoke.medium(mi, density, voxel, origin, extinction, (albedo,) * 3)}
     return smoke._photographed(mi, scene, smoke.VolumeSettings(width=16, height=16, spp=spp, camera=CAMERA))
 
 
@@ -100,31 +100,28 @@ def centred(shape: tuple[int, int, int], voxel: float) -> tuple[float, float, fl
     return (-0.5 * (x - 1) * voxel, -0.5 * (y - 1) * voxel, -0.5 * (z - 1) * voxel)
 
 
-def test_white_furnace(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_white_furnace() -> None:
     """Smoke that absorbs nothing, in a light of 1 from everywhere, cannot be seen."""
-    monkeypatch.setattr(smoke, "SMOKE_ALBEDO", (1.0, 1.0, 1.0))
     density = np.random.Generator(np.random.Philox(key=3)).random((5, 7, 6), dtype=np.float32)
-    picture = alone(density, 0.1, centred(density.shape, 0.1), extinction=4.0, spp=512)
+    picture = alone(density, 0.1, centred(density.shape, 0.1), extinction=4.0, spp=512, albedo=1.0)
     assert picture.mean() == pytest.approx(1.0, abs=3e-3)  # the noise of 256 x 512 paths
     assert picture == pytest.approx(1.0, abs=0.12)  # that of 512 paths, five deviations
 
 
-def test_beer_lambert_through_a_slab(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_beer_lambert_through_a_slab() -> None:
     """Black smoke 0.5 thick with an extinction of 3 lets exp(-1.5) of the light through."""
-    monkeypatch.setattr(smoke, "SMOKE_ALBEDO", (0.0, 0.0, 0.0))
     density = np.full((5, 12, 12), 0.75, np.float32)
-    picture = alone(density, 0.1, centred(density.shape, 0.1), extinction=4.0, spp=256)
+    picture = alone(density, 0.1, centred(density.shape, 0.1), extinction=4.0, spp=256, albedo=0.0)
     inside = picture[4:12, 4:12]
     noise = np.sqrt(np.exp(-1.5) * (1 - np.exp(-1.5)) / (256 * 64))
     assert inside.mean() == pytest.approx(np.exp(-1.5), abs=4 * noise)
 
 
-def test_the_volume_stands_where_its_grid_says(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_volume_stands_where_its_grid_says() -> None:
     """An asymmetric grid with a negative origin: one black cell at (-0.2, +0.1), a view 0.56 wide."""
-    monkeypatch.setattr(smoke, "SMOKE_ALBEDO", (0.0, 0.0, 0.0))
     density = np.zeros((3, 6, 4), np.float32)
     density[1, 4, 1] = 1.0
-    picture = alone(density, 0.05, (-0.25, -0.1, -0.05), extinction=400.0, spp=64)[..., 0]
+    picture = alone(density, 0.05, (-0.25, -0.1, -0.05), extinction=400.0, spp=64, albedo=0.0)[..., 0]
     weight = 1.0 - picture
     rows, columns = np.mgrid[0:16, 0:16]
     at = np.array([(weight * columns).sum(), (weight * rows).sum()]) / weight.sum()

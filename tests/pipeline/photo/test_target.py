@@ -11,7 +11,8 @@ from tiny import PHOTO, changed, scene
 from pipeline import cli
 from pipeline.errors import BadInput, InvalidValue
 from pipeline.files import pictures
-from pipeline.photo.target import check_target, read_strokes, read_target
+from pipeline.photo.frames import frames_memory
+from pipeline.photo.target import check_target, flowing_size, read_strokes, read_target
 
 OWN = PHOTO.replace("assets/stream/image.jpg", "a.png").replace("assets/stream/mask.png", "m.png").replace(
     "[[[490, 28], [487, 64]], [[305, 288], [245, 328]]]", "[[[20, 10], [20, 50]]]")
@@ -81,6 +82,18 @@ def test_strokes_that_are_none_are_told(tmp_path: Path, stroke: str, told: str) 
     with pytest.raises(InvalidValue, match=told) as caught:
         check_target(scene(own(tmp_path), changed(OWN, "[[20, 10], [20, 50]]", stroke)))
     assert caught.value.key == "photo.strokes[0]"
+
+
+def test_only_the_part_round_the_matte_flows(tmp_path: Path) -> None:
+    """The matte is the left half of 120 pixels, at 96: 48, and a piece to each side of it."""
+    assert flowing_size(scene(own(tmp_path), OWN)) == (48, 48 + 2 * 16 + 1)
+
+
+def test_more_memory_than_there_is_is_told_before_anything_is_made(tmp_path: Path) -> None:
+    text = changed(changed(OWN, "width = 96", "width = 4096"), "frames = 8", "frames = 1000")
+    needed, key = frames_memory(scene(own(tmp_path), text))
+    assert needed > 100e9
+    assert key == "photo.width"
 
 
 def test_what_is_frozen_must_leave_something(tmp_path: Path) -> None:
