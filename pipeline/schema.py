@@ -20,7 +20,7 @@ from pydantic_core import PydanticUndefined
 
 from pipeline.files import atomic
 from pipeline.methods import METHODS
-from pipeline.tables import PROJECT_SCENES
+from pipeline.tables import PROJECT_SCENES, AssetOrFolder, Folder
 
 README, SCHEMA = PROJECT_SCENES / "README.md", PROJECT_SCENES / "scene.schema.json"
 BY = "written by flowloom schema --write"
@@ -108,8 +108,13 @@ def limits(metadata: Iterable[Any]) -> str:
     return f"{low}, {high}" if low and high else ""
 
 
+PATHS: dict[str, Any] = {"folder": Folder, "file or folder": AssetOrFolder}
+"""In the reader's words, paths that are not those of a file alone."""
+
+
 def spelled(annotation: Any, metadata: Iterable[Any] = ()) -> str:
     """A type in the reader's words: integer [1, 50], "lit", array of 2 integers [4, 4096] …"""
+    metadata = list(metadata)
     origin, parts = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is typing.Annotated:
         inner = [m for part in parts[1:] for m in (part.metadata if isinstance(part, FieldInfo) else [part])]
@@ -124,7 +129,9 @@ def spelled(annotation: Any, metadata: Iterable[Any] = ()) -> str:
         count = f"{shortest} to {longest}" if shortest != longest else f"{shortest}"
         count = count if parts[-1] is Ellipsis else f"{len(parts)}"
         return f"array of {count}: {spelled(parts[0])}"
-    name = {int: "integer", float: "number", str: "text", bool: "true or false", Path: "file"}.get(annotation, "table")
+    if annotation is Path:
+        return next((word for word, kind in PATHS.items() if kind.__metadata__[-1] in metadata), "file")
+    name = {int: "integer", float: "number", str: "text", bool: "true or false"}.get(annotation, "table")
     return f"{name} {limits(metadata)}".strip()
 
 

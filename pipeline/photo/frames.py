@@ -85,11 +85,13 @@ def widened(scene: PhotoScene, assignment: arrays.Arrays) -> str:
 
     angle = assignment["angle"]
     wide = int((angle > ANGLES[0]).sum())
-    guides = " and ".join(name for name, there in (("the strokes", scene.photo.strokes or scene.photo.made),
-                                                   ("the speed map", scene.photo.speed)) if there)
+    photo = scene.photo
+    near = " and ".join(text for text, there in (
+        (f"within {ANGLES[0]:.0f} degrees of the strokes", photo.strokes or photo.made),
+        ("near the speeds of the strokes", photo.speeds), ("near the speed map", photo.speed)) if there)
     return "" if not wide else (
-        f"clips: {wide} of {len(angle)} pieces of the picture found too few candidates within {ANGLES[0]:.0f} degrees "
-        f"of {guides}; the angle was widened, to {angle.max():.0f} at most")
+        f"clips: {wide} of {len(angle)} pieces of the picture found too few candidates {near}; the angle was widened, "
+        f"to {angle.max():.0f} degrees at most, and the range of speeds with it")
 
 
 def _boxed(scene: PhotoScene, target: Any, inputs: Inputs) -> tuple[tuple[slice, slice], Any]:

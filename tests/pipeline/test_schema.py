@@ -14,6 +14,7 @@ from pipeline import cli, schema
 from pipeline.build.method import Method
 from pipeline.listing import project_scenes
 from pipeline.methods import METHODS
+from pipeline.tables import Asset, AssetOrFolder, Folder
 
 TABLES = [(path, model) for method in METHODS for path, model in schema.tables(method.scene)]
 
@@ -60,6 +61,11 @@ def test_every_number_has_a_range_and_every_key_a_description(path: str, model: 
         said = schema.spelled(field.annotation, field.metadata)
         bare = re.search(r"\b(integer|number)(?! [\[(])", said)
         assert not bare or name == "centre", f"{path}.{name} has no range: {said}"
+
+
+def test_a_path_is_a_file_or_a_folder_as_its_check_is() -> None:
+    assert [schema.spelled(kind) for kind in (Asset, Folder, AssetOrFolder, Folder | None)] == [
+        "file", "folder", "file or folder", "folder"]
 
 
 def test_every_table_refuses_what_it_does_not_know() -> None:

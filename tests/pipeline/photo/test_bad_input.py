@@ -17,6 +17,7 @@ from tiny import PHOTO, changed
 from pipeline import cli
 from pipeline.build.graph import BuildGraph
 from pipeline.files import pictures
+from pipeline.photo.frames import widened
 from pipeline.photo.target import read_target
 
 SCENE = PHOTO
@@ -150,6 +151,15 @@ def test_one_clip_alone_will_do_and_its_poor_choice_is_told(home: Path, capsys: 
     assert "pieces of the picture found too few candidates within 45 degrees of the strokes; the angle was" in err
     assert cli.run(["synth", "tiny.toml", "--quiet", "--out", "other"]) == 0
     assert capsys.readouterr().err == ""
+
+
+def test_what_was_widened_is_named(home: Path) -> None:
+    one = tiny.scene(home, changed(OWN, "[photo]", "[photo]\nspeeds = [2.0]"))
+    told = widened(one, {"angle": np.array([45.0, 90.0])})
+    assert told == ("clips: 1 of 2 pieces of the picture found too few candidates within 45 degrees of the strokes and "
+                    "near the speeds of the strokes; the angle was widened, to 90 degrees at most, and the range of "
+                    "speeds with it")
+    assert widened(one, {"angle": np.array([45.0, 45.0])}) == ""
 
 
 def test_a_clip_without_a_piece_that_moves_is_told(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
